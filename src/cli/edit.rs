@@ -4,7 +4,7 @@ use crate::cli::numbers::from_one;
 use crate::cli::object_values::ObjectValues;
 use crate::cli::options::{DenoiseOptions, DeviceOptions, Replace};
 use crate::cli::photographs::write_with_progress;
-use crate::cli::saved::{Loaded, SavedOptions};
+use crate::cli::saved::SavedOptions;
 use crate::error::{Error, Result};
 use crate::export::overwrite;
 use crate::say;
@@ -53,31 +53,23 @@ pub fn edit(arguments: &EditArguments) -> Result<i32> {
     // Writing into the folder of the results would replace the estimate that was found.
     let absolute = |path: &PathBuf| path.canonicalize().ok();
     if absolute(&arguments.out).is_some_and(|out| absolute(&arguments.saved.dir) == Some(out)) {
-        return Err(Error::usage(
-            "--out",
-            "is the folder of the results themselves",
-            "choose another folder",
-        ));
+        let problem = "is the folder of the results themselves";
+        return Err(Error::usage("--out", problem, "choose another folder"));
     }
     // Nor may the results of another solve be replaced.
     overwrite::check(&arguments.out.join(save::REPORT))?;
     let renderer = arguments.device.renderer()?;
-    let Loaded {
-        saved,
-        capture,
-        found,
-        mut edits,
-        ..
-    } = arguments.saved.load()?;
-    arguments.values.add(&capture.scene, &mut edits, false)?;
-    let edited = Arc::new(edits.apply(&found));
+    let mut loaded = arguments.saved.load()?;
+    let capture = loaded.capture;
+    (arguments.values).add(&capture.scene, &mut loaded.edits, false)?;
+    let edited = Arc::new(loaded.edits.apply(&loaded.found));
     let denoiser = arguments.denoise.denoiser(true)?;
     let photographs = arguments.photographs.then(|| Photographs {
         frames: (0..capture.scene.cameras.len()).collect(),
         capture: capture.clone(),
-        found,
+        found: loaded.found,
         edited: edited.clone(),
-        settings: saved.settings.clone(),
+        settings: loaded.saved.settings.clone(),
         placements: Vec::new(),
         relight: true,
         samples: arguments.spp,
@@ -86,11 +78,11 @@ pub fn edit(arguments: &EditArguments) -> Result<i32> {
     });
     let results = Results {
         capture,
-        settings: saved.settings,
+        settings: loaded.saved.settings,
         estimate: edited,
         edits: Edits::default(),
         progress: Arc::default(),
-        stopped_because: Some(saved.termination),
+        stopped_because: Some(loaded.saved.termination),
         checkpoint: None,
         views: arguments.views.unwrap_or_default(),
         renderer: renderer.clone(),

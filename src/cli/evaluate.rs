@@ -42,13 +42,9 @@ pub fn evaluate(arguments: &EvaluateArguments) -> Result<()> {
     };
     let capture = open(&Source::Folder(arguments.truth.clone()), &options)?;
     let estimate = saved.estimate_by_name(&capture)?;
-    let evaluation = compare(
-        &arguments.truth,
-        &capture.capture,
-        &capture.scene,
-        &capture.photographs,
-        &estimate,
-    )?;
+    let (scene, photographs) = (&capture.scene, &capture.photographs);
+    let (truth, read) = (&arguments.truth, &capture.capture);
+    let evaluation = compare(truth, read, scene, photographs, &estimate)?;
     if arguments.json {
         let text = serde_json::to_string_pretty(&evaluation)
             .map_err(|error| Error::new("evaluate", error, ""))?;
@@ -88,13 +84,9 @@ fn table(e: &Evaluation) -> String {
         "object", "pixels", "albedo err", "emission err"
     );
     for (name, errors) in &per_object {
-        let albedo = errors.albedo_rel.filter(|_| errors.scored);
-        text += &format!(
-            "{name:width$}  {:>8}  {:>10}  {:>12}\n",
-            errors.pixels,
-            number(albedo),
-            number(errors.emission_rel)
-        );
+        let albedo = number(errors.albedo_rel.filter(|_| errors.scored));
+        let (pixels, emission) = (errors.pixels, number(errors.emission_rel));
+        text += &format!("{name:width$}  {pixels:>8}  {albedo:>10}  {emission:>12}\n");
     }
     text
 }

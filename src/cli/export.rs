@@ -2,13 +2,14 @@
 
 use crate::cli::numbers::{from_one, triple, whole, width};
 use crate::cli::options::Replace;
-use crate::cli::saved::{Loaded, SavedOptions};
+use crate::cli::saved::SavedOptions;
 use crate::error::{Error, Result};
 use crate::export::overwrite;
 use crate::export::scene::{self, Format};
 use crate::room;
 use crate::room::photographs::{Rendering, STORED};
 use crate::say;
+use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use std::path::{Path, PathBuf};
@@ -20,7 +21,7 @@ pub struct ExportArguments {
     saved: SavedOptions,
     /// What to write
     #[arg(long, value_enum)]
-    format: FormatName,
+    format: Format,
     /// Position of a probe in the capture's coordinates
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
     at: Option<DVec3>,
@@ -31,64 +32,45 @@ pub struct ExportArguments {
     replace: Replace,
 }
 
-/// The formats by their names on the command line.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum FormatName {
-    /// Scene with base colours and emissive strength
-    Glb,
-    /// Scene as OBJ and MTL, with textures as images
-    Obj,
-    /// Scene as PLY with vertex colours
-    Ply,
-    /// Scene for Mitsuba 3
-    Mitsuba,
-    /// Table of objects
-    Csv,
-    /// The light at a point as a panorama
-    Probe,
+/// Name and help of a format on the command line.
+fn described(format: Format) -> (&'static str, &'static str) {
+    match format {
+        Format::Glb => ("glb", "Scene with base colours and emissive strength"),
+        Format::Obj => ("obj", "Scene as OBJ and MTL, with textures as images"),
+        Format::Ply => ("ply", "Scene as PLY with vertex colours"),
+        Format::Mitsuba => ("mitsuba", "Scene for Mitsuba 3"),
+        Format::Csv => ("csv", "Table of objects"),
+        Format::Probe { .. } => ("probe", "The light at a point as a panorama"),
+    }
 }
 
-impl FormatName {
-    /// The format; a probe is taken at `at`.
-    fn format(self, at: DVec3) -> Format {
-        match self {
-            Self::Glb => Format::Glb,
-            Self::Obj => Format::Obj,
-            Self::Ply => Format::Ply,
-            Self::Mitsuba => Format::Mitsuba,
-            Self::Csv => Format::Csv,
-            Self::Probe => Format::Probe { at },
-        }
+impl ValueEnum for Format {
+    fn value_variants<'a>() -> &'a [Self] {
+        const PROBE: Format = Format::Probe { at: DVec3::ZERO };
+        use Format::{Csv, Glb, Mitsuba, Obj, Ply};
+        &[Glb, Obj, Ply, Mitsuba, Csv, PROBE]
     }
 
-    /// File extensions of the format.
-    fn endings(self) -> &'static [&'static str] {
-        self.format(DVec3::ZERO).endings()
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let (name, help) = described(*self);
+        Some(PossibleValue::new(name).help(help))
     }
+}
 
-    /// Refuses a path whose extension belongs to another format. An unknown extension is accepted.
-    fn check(self, path: &Path) -> Result<()> {
-        let ending = path.extension().and_then(|ending| ending.to_str());
-        let ending = ending.unwrap_or_default().to_ascii_lowercase();
-        let is_of = |word: &Self| word.endings().contains(&ending.as_str());
-        let other = Self::value_variants().iter().find(|word| is_of(word));
-        let (Some(other), false) = (other, is_of(&self)) else {
-            return Ok(());
-        };
-        let name = |word: Self| {
-            word.to_possible_value()
-                .map_or(String::new(), |v| v.get_name().to_owned())
-        };
-        Err(Error::usage(
-            path.display(),
-            format!("has the wrong extension for --format {}", name(self)),
-            format!(
-                "use the extension .{}, or choose --format {}",
-                self.endings().join(" or ."),
-                name(*other)
-            ),
-        ))
-    }
+/// Refuses a path whose extension belongs to another format. An unknown extension is accepted.
+fn check_extension(path: &Path, format: Format) -> Result<()> {
+    let ending = path.extension().and_then(|ending| ending.to_str());
+    let ending = ending.unwrap_or_default().to_ascii_lowercase();
+    let is_of = |format: &Format| format.endings().contains(&ending.as_str());
+    let other = Format::value_variants().iter().find(|other| is_of(other));
+    let (Some(other), false) = (other, is_of(&format)) else {
+        return Ok(());
+    };
+    let [(own, _), (other, _)] = [format, *other].map(described);
+    let problem = format!("has the wrong extension for --format {own}");
+    let endings = format.endings().join(" or .");
+    let remedy = format!("use the extension .{endings}, or choose --format {other}");
+    Err(Error::usage(path.display(), problem, remedy))
 }
 
 /// `relit demo`.
@@ -118,21 +100,20 @@ pub struct DemoArguments {
 /// The results cannot be read, or the file cannot be written.
 pub fn export(arguments: &ExportArguments) -> Result<()> {
     arguments.replace.apply();
-    arguments.format.check(&arguments.out)?;
+    check_extension(&arguments.out, arguments.format)?;
     overwrite::check(&arguments.out)?;
-    if matches!(arguments.format, FormatName::Probe) && arguments.at.is_none() {
-        return Err(Error::usage(
-            "--format probe",
-            "a probe needs a place",
-            "add --at x,y,z",
-        ));
-    }
-    let format = arguments.format.format(arguments.at.unwrap_or_default());
-    let Loaded {
-        capture, estimate, ..
-    } = arguments.saved.load()?;
-    scene::write(&capture.scene, &estimate, format, &arguments.out)?;
-    if let Some(lost) = scene::lost(&estimate, format) {
+    let format = match (arguments.format, arguments.at) {
+        (Format::Probe { .. }, None) => {
+            let problem = "a probe needs a place";
+            return Err(Error::usage("--format probe", problem, "add --at x,y,z"));
+        }
+        (Format::Probe { .. }, Some(at)) => Format::Probe { at },
+        (format, _) => format,
+    };
+    let loaded = arguments.saved.load()?;
+    let (scene, estimate) = (&loaded.capture.scene, &loaded.estimate);
+    scene::write(scene, estimate, format, &arguments.out)?;
+    if let Some(lost) = scene::lost(estimate, format) {
         say::warning(lost);
     }
     say::line(arguments.out.display());

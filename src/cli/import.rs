@@ -2,7 +2,7 @@
 
 use crate::capture::import::{self, AppliedTransform, Format, Import, ImportOptions};
 use crate::capture::read::CAMERAS;
-use crate::cli::numbers::{above_zero, from_one, triple};
+use crate::cli::numbers::{above_zero, from_one, intrinsics, triple};
 use crate::cli::options::Replace;
 use crate::cli::progress::bar;
 use crate::error::Result;
@@ -47,7 +47,7 @@ pub struct ImportArguments {
     up: Option<DVec3>,
     /// Intrinsics of the colour camera, in pixels with centres at whole numbers, for a scan that has none
     #[arg(long, value_name = "FX,FY,CX,CY", value_parser = intrinsics, allow_hyphen_values = true)]
-    intrinsics: Option<Intrinsics>,
+    intrinsics: Option<[f64; 4]>,
     /// Nerfstudio's applied_transform [default: undone for a mesh that comes from elsewhere]
     #[arg(long, value_enum, value_name = "undo|keep")]
     applied_transform: Option<Applied>,
@@ -60,21 +60,6 @@ enum Applied {
     Undo,
     /// Mesh and poses share its coordinates
     Keep,
-}
-
-/// fx, fy, cx, cy.
-#[derive(Debug, Clone, Copy)]
-struct Intrinsics([f64; 4]);
-
-fn intrinsics(text: &str) -> std::result::Result<Intrinsics, String> {
-    let numbers: Option<Vec<f64>> = text
-        .split(',')
-        .map(|part| part.trim().parse().ok().filter(|v: &f64| v.is_finite()))
-        .collect();
-    match numbers.as_deref() {
-        Some(&[fx, fy, cx, cy]) if fx > 0.0 && fy != 0.0 => Ok(Intrinsics([fx, fy, cx, cy])),
-        _ => Err("four numbers are wanted, e.g. 525,525,319.5,239.5".to_owned()),
-    }
 }
 
 /// Imports a scan as a capture and prints what was found and guessed.
@@ -92,7 +77,7 @@ pub fn import(arguments: &ImportArguments) -> Result<()> {
         max_frames: arguments.max_frames.map(|n| n as usize),
         keep_poses: arguments.keep_poses,
         up: arguments.up,
-        intrinsics: arguments.intrinsics.map(|k| k.0),
+        intrinsics: arguments.intrinsics,
         applied_transform: match arguments.applied_transform {
             None => AppliedTransform::Guess,
             Some(Applied::Undo) => AppliedTransform::Undo,

@@ -3,14 +3,15 @@
 use crate::cli::numbers::{above_zero, degrees, from_one, pair, triple};
 use crate::cli::options::{DenoiseOptions, DeviceOptions, Replace};
 use crate::cli::photographs::write_with_progress;
-use crate::cli::saved::{Loaded, SavedOptions};
+use crate::cli::saved::SavedOptions;
 use crate::compose::object::surface::MaterialOverride;
 use crate::compose::placement::Placement;
+use crate::compose::write::with_ending;
 use crate::error::Result;
 use crate::session::photographs::Photographs;
-use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
+use clap::error::ErrorKind;
+use clap::{ArgAction, ArgMatches, Args, Command, FromArgMatches};
 use glam::{DVec2, DVec3, Vec3};
-use std::ffi::OsString;
 use std::path::PathBuf;
 
 /// `relit insert`.
@@ -47,35 +48,25 @@ pub struct InsertArguments {
 pub fn insert(arguments: &InsertArguments) -> Result<i32> {
     arguments.replace.apply();
     let renderer = arguments.device.renderer()?;
-    let Loaded {
-        saved,
-        capture,
-        found,
-        edits,
-        estimate,
-    } = arguments.saved.load()?;
+    let loaded = arguments.saved.load()?;
     let work = Photographs {
         frames: match arguments.frame {
             FrameChoice::One(frame) => vec![frame],
-            FrameChoice::All => (0..capture.scene.cameras.len()).collect(),
+            FrameChoice::All => (0..loaded.capture.scene.cameras.len()).collect(),
         },
-        capture,
-        found,
-        edited: estimate,
-        settings: saved.settings,
+        capture: loaded.capture,
+        found: loaded.found,
+        edited: loaded.estimate,
+        settings: loaded.saved.settings,
         placements: arguments.objects.0.clone(),
-        relight: !edits.is_empty(),
+        relight: !loaded.edits.is_empty(),
         samples: arguments.spp,
         denoise: arguments.denoise.denoiser(true)?,
         finish: arguments.finish,
     };
     write_with_progress(&work, &renderer, &|frame| match arguments.frame {
         FrameChoice::One(_) => arguments.out.clone(),
-        FrameChoice::All => {
-            let mut name = OsString::from(&arguments.out);
-            name.push(format!(".{frame:03}"));
-            PathBuf::from(name)
-        }
+        FrameChoice::All => with_ending(&arguments.out, &format!(".{frame:03}")),
     })
 }
 
@@ -95,10 +86,6 @@ fn frame_choice(text: &str) -> std::result::Result<FrameChoice, String> {
             .map_err(|_| "a frame's number or all is wanted".to_owned()),
     }
 }
-
-/// The objects in the order of the command line.
-#[derive(Debug, Clone, Default)]
-struct Objects(Vec<Placement>);
 
 /// Parses KIND:R,G,B or KIND:R,G,B,ROUGHNESS: linear base colour and GGX roughness α, all from 0 to 1.
 fn material(text: &str) -> std::result::Result<MaterialOverride, String> {
@@ -121,71 +108,47 @@ fn material(text: &str) -> std::result::Result<MaterialOverride, String> {
     })
 }
 
+/// Objects and what is said of each.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Objects; each option is for the --object before it")]
+struct ObjectOptions {
+    /// OBJ or GLB file; may repeat
+    #[arg(long, value_name = "FILE", required = true)]
+    object: Vec<PathBuf>,
+    /// Position of the centre of its base, in the capture's coordinates
+    #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
+    at: Vec<DVec3>,
+    /// Use the file's coordinates as the capture's
+    #[arg(
+        long,
+        id = "as-modelled",
+        value_name = "",
+        num_args = 0,
+        default_missing_value = "true"
+    )]
+    as_modelled: Vec<bool>,
+    /// Factor on the file's size [default: 1]
+    #[arg(long, value_name = "S", value_parser = above_zero)]
+    scale: Vec<f64>,
+    /// Rotation about the up axis, counter-clockwise from above [default: 0]
+    #[arg(long, value_name = "DEG", value_parser = degrees, allow_hyphen_values = true)]
+    rotate: Vec<f64>,
+    /// Rotation about the file's x and z axes in degrees, z first, before --rotate [default: 0,0]
+    #[arg(long, value_name = "X,Z", value_parser = pair, allow_hyphen_values = true)]
+    tilt: Vec<DVec2>,
+    /// Replaces the file's materials: diffuse:R,G,B, plastic:R,G,B,ROUGHNESS or metal:R,G,B,ROUGHNESS
+    #[arg(long, value_name = "KIND:R,G,B[,ROUGHNESS]", value_parser = material)]
+    material: Vec<MaterialOverride>,
+}
+
+/// The objects in the order of the command line, made of [`ObjectOptions`].
+#[derive(Debug, Clone, Default)]
+struct Objects(Vec<Placement>);
+
 impl Args for Objects {
     fn augment_args(command: Command) -> Command {
-        let option = |name: &'static str, value: &'static str, help: &'static str| {
-            Arg::new(name)
-                .long(name)
-                .value_name(value)
-                .help(help)
-                .action(ArgAction::Append)
-                .help_heading("Objects; each option is for the --object before it")
-        };
-        command
-            .arg(
-                option("object", "FILE", "OBJ or GLB file; may repeat")
-                    .required(true)
-                    .value_parser(clap::value_parser!(PathBuf)),
-            )
-            .arg(
-                option(
-                    "at",
-                    "X,Y,Z",
-                    "Position of the centre of its base, in the capture's coordinates",
-                )
-                .allow_hyphen_values(true)
-                .value_parser(triple),
-            )
-            .arg(
-                option(
-                    "as-modelled",
-                    "",
-                    "Use the file's coordinates as the capture's",
-                )
-                .num_args(0)
-                .default_missing_value("true")
-                .value_parser(clap::value_parser!(bool)),
-            )
-            .arg(
-                option("scale", "S", "Factor on the file's size [default: 1]")
-                    .value_parser(above_zero),
-            )
-            .arg(
-                option(
-                    "rotate",
-                    "DEG",
-                    "Rotation about the up axis, counter-clockwise from above [default: 0]",
-                )
-                .allow_hyphen_values(true)
-                .value_parser(degrees),
-            )
-            .arg(
-                option(
-                    "tilt",
-                    "X,Z",
-                    "Rotation about the file's x and z axes in degrees, z first, before --rotate [default: 0,0]",
-                )
-                .allow_hyphen_values(true)
-                .value_parser(pair),
-            )
-            .arg(
-                option(
-                    "material",
-                    "KIND:R,G,B[,ROUGHNESS]",
-                    "Replaces the file's materials: diffuse:R,G,B, plastic:R,G,B,ROUGHNESS or metal:R,G,B,ROUGHNESS",
-                )
-                .value_parser(material),
-            )
+        // Without its heading for what follows.
+        ObjectOptions::augment_args(command).next_help_heading(None::<&'static str>)
     }
 
     fn augment_args_for_update(command: Command) -> Command {
@@ -193,62 +156,53 @@ impl Args for Objects {
     }
 }
 
-/// The values of an option with their indices on the command line.
-fn indexed_values<T: Clone + Send + Sync + 'static>(
+fn wrong(problem: String) -> clap::Error {
+    clap::Error::raw(ErrorKind::ArgumentConflict, problem)
+}
+
+/// Gives each value of an option to the object that it belongs to: the last `--object` before it.
+fn give<O, T>(
     matches: &ArgMatches,
+    objects: &mut [O],
     name: &str,
-) -> Vec<(usize, T)> {
-    let values = matches.get_many::<T>(name).into_iter().flatten().cloned();
-    let indices = matches.indices_of(name).into_iter().flatten();
-    indices.zip(values).collect()
+    values: Vec<T>,
+    set: impl Fn(&mut O, T),
+) -> std::result::Result<(), clap::Error> {
+    let places = |name: &str| matches.indices_of(name).into_iter().flatten();
+    for (place, value) in places(name).zip(values) {
+        let before = places("object").filter(|object| *object < place).count();
+        let owner = before.checked_sub(1);
+        let owner = owner.ok_or_else(|| wrong(format!("--{name} stands before any --object")))?;
+        set(&mut objects[owner], value);
+    }
+    Ok(())
 }
 
 impl FromArgMatches for Objects {
     fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<Self, clap::Error> {
-        let files = indexed_values::<PathBuf>(matches, "object");
-        let wrong =
-            |problem: String| clap::Error::raw(clap::error::ErrorKind::ArgumentConflict, problem);
-        // Index of the object that an option belongs to: the last --object before it.
-        let owner = |index: usize, name: &str| {
-            let before = files.iter().filter(|(at, _)| *at < index).count();
-            before
-                .checked_sub(1)
-                .ok_or_else(|| wrong(format!("--{name} stands before any --object")))
-        };
-        let mut objects = Self(
-            files
-                .iter()
-                .map(|(_, file)| Placement::new(file, None))
-                .collect(),
-        );
-        let mut as_modelled = vec![false; files.len()];
-        for (index, at) in indexed_values::<DVec3>(matches, "at") {
-            objects.0[owner(index, "at")?].at = Some(at);
-        }
-        for (index, flag) in indexed_values::<bool>(matches, "as-modelled") {
-            as_modelled[owner(index, "as-modelled")?] = flag;
-        }
-        for (index, scale) in indexed_values::<f64>(matches, "scale") {
-            objects.0[owner(index, "scale")?].scale = scale;
-        }
-        for (index, rotate) in indexed_values::<f64>(matches, "rotate") {
-            objects.0[owner(index, "rotate")?].rotate = rotate;
-        }
-        for (index, tilt) in indexed_values::<DVec2>(matches, "tilt") {
-            objects.0[owner(index, "tilt")?].tilt = tilt;
-        }
-        for (index, material) in indexed_values::<MaterialOverride>(matches, "material") {
-            objects.0[owner(index, "material")?].material = Some(material);
-        }
-        for (placement, as_modelled) in objects.0.iter().zip(as_modelled) {
+        let given = ObjectOptions::from_arg_matches(matches)?;
+        let files = given.object.iter();
+        let mut objects: Vec<_> = files.map(|file| Placement::new(file, None)).collect();
+        let mut as_modelled = vec![false; objects.len()];
+        let all = &mut objects;
+        give(matches, all, "at", given.at, |o, at| o.at = Some(at))?;
+        let flags = &mut as_modelled;
+        give(matches, flags, "as-modelled", given.as_modelled, |o, is| {
+            *o = is
+        })?;
+        give(matches, all, "scale", given.scale, |o, s| o.scale = s)?;
+        give(matches, all, "rotate", given.rotate, |o, r| o.rotate = r)?;
+        give(matches, all, "tilt", given.tilt, |o, tilt| o.tilt = tilt)?;
+        let made_of = |o: &mut Placement, material| o.material = Some(material);
+        give(matches, all, "material", given.material, made_of)?;
+        for (placement, as_modelled) in objects.iter().zip(as_modelled) {
             if placement.at.is_some() == as_modelled {
-                return Err(wrong(format!(
-                    "--object {} needs either --at x,y,z or --as-modelled",
-                    placement.file.display()
-                )));
+                let file = placement.file.display();
+                let problem = format!("--object {file} needs either --at x,y,z or --as-modelled");
+                return Err(wrong(problem));
             }
         }
-        Ok(objects)
+        Ok(Self(objects))
     }
 
     fn update_from_arg_matches(
@@ -283,10 +237,8 @@ mod tests {
         let made = parsed[1].material.expect("a material");
         let made = made.surface().material(None);
         let lobe = made.lobe.expect("a metal shines");
-        assert_eq!(
-            (lobe.roughness, lobe.specular),
-            (0.25, Vec3::new(0.9, 0.6, 0.3))
-        );
+        let gold = Vec3::new(0.9, 0.6, 0.3);
+        assert_eq!((lobe.roughness, lobe.specular), (0.25, gold));
         assert_eq!(parsed[0].at, Some(DVec3::new(-1.0, 0.0, 2.0)));
         assert_eq!((parsed[0].scale, parsed[0].rotate), (1.0, -90.0));
         assert_eq!(parsed[0].tilt, DVec2::new(-30.0, 15.0));
@@ -308,13 +260,10 @@ mod tests {
     fn materials_are_what_they_are_called_and_others_are_refused() {
         let made = |text| material(text).expect("valid").surface().material(None);
         assert!(made("diffuse:0.1,0.2,0.3").lobe.is_none());
-        let lobe = made("plastic:0.1,0.2,0.3,0.5")
-            .lobe
-            .expect("plastic shines");
-        assert_eq!(
-            (lobe.roughness, lobe.specular),
-            (0.5, Vec3::splat(DIELECTRIC))
-        );
+        let plastic = made("plastic:0.1,0.2,0.3,0.5");
+        let lobe = plastic.lobe.expect("plastic shines");
+        let specular = Vec3::splat(DIELECTRIC);
+        assert_eq!((lobe.roughness, lobe.specular), (0.5, specular));
         for text in [
             "",
             "diffuse",
@@ -327,10 +276,8 @@ mod tests {
             "plastic:0.1,NaN,0.3,0.5",
             "glass:0.1,0.2,0.3,0.5",
         ] {
-            assert!(
-                material(text).is_err_and(|e| e.contains("is wanted")),
-                "{text}"
-            );
+            let refused = material(text).is_err_and(|e| e.contains("is wanted"));
+            assert!(refused, "{text}");
         }
     }
 }

@@ -4,7 +4,6 @@ mod arguments;
 mod edit;
 mod evaluate;
 mod export;
-mod families;
 mod import;
 mod insert;
 mod interrupt;
@@ -82,8 +81,8 @@ fn act(arguments: Arguments, window: Option<Window>) -> Result<i32> {
         Some(Action::Study(studied)) => study::study(&studied).map(done),
         Some(Action::Solve(capture)) => {
             let known = ObjectValues {
-                emission: capture.known.known_emission,
-                albedo: capture.known.known_albedo,
+                emission: capture.known_emission,
+                albedo: capture.known_albedo,
                 ..ObjectValues::default()
             };
             let mut options = capture.solve;
@@ -111,9 +110,8 @@ fn misspelt_command() -> Option<Error> {
 fn similar_command(word: &str) -> Option<Error> {
     let command = Arguments::command();
     let names = command.get_subcommands().map(|known| known.get_name());
-    let (distance, name) = names
-        .map(|name| (strsim::osa_distance(word, name), name))
-        .min()?;
+    let distances = names.map(|name| (strsim::osa_distance(word, name), name));
+    let (distance, name) = distances.min()?;
     // At most MAX_TYPOS errors, and fewer than half of the letters.
     let near = distance <= MAX_TYPOS && 2 * distance < name.len();
     near.then(|| unknown_command(word, &format!("did you mean '{name}'?")))
@@ -190,9 +188,6 @@ fn usage_error(error: &clap::Error) -> Error {
         .filter(|line| !line.is_empty() && !line.starts_with("For more information"))
         .collect();
     let message = message.join(" ");
-    Error::usage(
-        "command line",
-        message.strip_prefix("error: ").unwrap_or(&message),
-        "see relit --help",
-    )
+    let problem = message.strip_prefix("error: ").unwrap_or(&message);
+    Error::usage("command line", problem, "see relit --help")
 }

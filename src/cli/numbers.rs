@@ -79,6 +79,14 @@ pub fn triple(text: &str) -> Parsed<DVec3> {
     }
 }
 
+/// Focal lengths fx and fy, and the principal point cx and cy.
+pub fn intrinsics(text: &str) -> Parsed<[f64; 4]> {
+    match numbers(text).as_deref() {
+        Some(&[fx, fy, cx, cy]) if fx > 0.0 && fy != 0.0 => Ok([fx, fy, cx, cy]),
+        _ => Err("four numbers are wanted, e.g. 525,525,319.5,239.5".to_owned()),
+    }
+}
+
 fn numbers(text: &str) -> Option<Vec<f64>> {
     text.split(',').map(|part| finite(part.trim())).collect()
 }
@@ -98,10 +106,8 @@ mod tests {
         assert_eq!(from_one::<u32>("7"), Ok(7));
         assert_eq!(threads("65535"), Ok(65535));
         for text in ["0", "-1", "a", "", "1.5", "65536"] {
-            assert_eq!(
-                wanted(threads(text)),
-                "a whole number from 1 to 65535 is wanted"
-            );
+            let range = "a whole number from 1 to 65535 is wanted";
+            assert_eq!(wanted(threads(text)), range);
         }
         assert_eq!((shift("-2"), quarters("-90")), (Ok(-2), Ok(3)));
         assert!(shift("a").is_err() && shift("0.5").is_err() && quarters("45").is_err());

@@ -80,28 +80,22 @@ fn find(scene: &Scene, name: &str) -> Result<usize> {
     let index = scene.objects.iter().position(|o| o.name == name);
     index.ok_or_else(|| {
         let names: Vec<&str> = scene.objects.iter().map(|o| o.name.as_str()).collect();
-        Error::usage(
-            name,
-            "the capture has no object of this name",
-            format!("choose among {}", names.join(", ")),
-        )
+        let problem = "the capture has no object of this name";
+        Error::usage(name, problem, format!("choose among {}", names.join(", ")))
     })
 }
 
 /// Parses NAME=R,G,B.
 pub fn named_color(text: &str) -> std::result::Result<(String, Vec3), String> {
-    let (name, color) = text
-        .rsplit_once('=')
-        .ok_or("NAME=r,g,b is wanted".to_owned())?;
+    let (name, color) = text.rsplit_once('=').ok_or("NAME=r,g,b is wanted")?;
     Ok((name.to_owned(), triple(color)?.as_vec3()))
 }
 
 /// Parses NAME=V.
 pub fn named_number(text: &str) -> std::result::Result<(String, f32), String> {
-    let (name, value) = text.rsplit_once('=').ok_or("NAME=v is wanted".to_owned())?;
-    let value: f32 = value
-        .parse()
-        .map_err(|_| format!("{value:?} is no number"))?;
+    let (name, value) = text.rsplit_once('=').ok_or("NAME=v is wanted")?;
+    let number = value.parse::<f32>();
+    let value = number.map_err(|_| format!("{value:?} is no number"))?;
     if !value.is_finite() {
         return Err(format!("{value} is no finite number"));
     }

@@ -46,20 +46,16 @@ impl DenoiseOptions {
     /// # Errors
     /// Open Image Denoise is asked for and is not installed.
     pub fn denoiser(self, to_look_at: bool) -> Result<Option<Denoiser>> {
+        if self.denoise == Denoise::Oidn && Denoiser::best() != Denoiser::Oidn {
+            let problem = "the library of Open Image Denoise 2 is not found";
+            let remedy = "install it, name its file in RELIT_OIDN, or pass --denoise builtin";
+            return Err(Error::new("--denoise oidn", problem, remedy));
+        }
         Ok(match self.denoise {
             Denoise::Auto => to_look_at.then(Denoiser::best),
             Denoise::Builtin => Some(Denoiser::Builtin),
+            Denoise::Oidn => Some(Denoiser::Oidn),
             Denoise::None => None,
-            Denoise::Oidn => match Denoiser::best() {
-                Denoiser::Oidn => Some(Denoiser::Oidn),
-                Denoiser::Builtin => {
-                    return Err(Error::new(
-                        "--denoise oidn",
-                        "the library of Open Image Denoise 2 is not found",
-                        "install it, name its file in RELIT_OIDN, or pass --denoise builtin",
-                    ));
-                }
-            },
         })
     }
 }

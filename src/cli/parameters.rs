@@ -30,12 +30,8 @@ impl Parameters {
 fn parse(parameter: &'static Parameter, text: &str) -> Result<Value, String> {
     let value = match (parameter.name, parameter.unit) {
         ("bounces", _) if text == "auto" => Value::Whole(0),
-        (_, "s") => duration(text).map(Value::Real).ok_or_else(|| {
-            format!(
-                "{} must be a time such as 90, 60s, 5m or 1h",
-                parameter.name
-            )
-        })?,
+        (name, "s") => (duration(text).map(Value::Real))
+            .ok_or_else(|| format!("{name} must be a time such as 90, 60s, 5m or 1h"))?,
         (_, "%") => parameter.parse(text.strip_suffix('%').unwrap_or(text))?,
         _ => parameter.parse(text)?,
     };

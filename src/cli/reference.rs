@@ -2,6 +2,7 @@
 
 use crate::cli::arguments::Arguments;
 use crate::inverse::settings::PARAMETERS;
+use clap::builder::PossibleValue;
 use clap::{Arg, ArgAction, Command, CommandFactory};
 use std::collections::BTreeSet;
 
@@ -90,10 +91,8 @@ fn section(title: &str, command: &Command) -> String {
     let usage = command.clone().render_usage().to_string();
     let usage: Vec<&str> = usage.lines().map(str::trim).collect();
     let usage = usage.join("\n").replacen("Usage: ", "", 1);
-    let mut text = format!(
-        "\n## {title}\n\n{}.\n\n```text\n{usage}\n```\n",
-        about(command)
-    );
+    let about = about(command);
+    let mut text = format!("\n## {title}\n\n{about}.\n\n```text\n{usage}\n```\n");
     let begins = |line: &&&str| line.strip_prefix(title).is_some_and(|r| r.starts_with(' '));
     let examples: Vec<&str> = match command.has_subcommands() {
         true => vec!["relit", "relit room"],
@@ -132,9 +131,8 @@ fn is_listed(argument: &Arg) -> bool {
 
 /// What a command does, without the full stop.
 fn about(command: &Command) -> String {
-    command
-        .get_about()
-        .map_or_else(String::new, ToString::to_string)
+    let about = command.get_about();
+    about.map_or_else(String::new, ToString::to_string)
 }
 
 /// One row per argument; empty without arguments.
@@ -163,21 +161,17 @@ fn table(title: &str, arguments: &[&Arg]) -> String {
 
 /// A table of an argument's possible values; empty unless they have help texts.
 fn values(argument: &Arg) -> String {
+    let explained = |value: &PossibleValue| {
+        let help = value.get_help()?.to_string();
+        Some(row(&[&format!("`{}`", value.get_name()), &help]))
+    };
     let values = argument.get_possible_values();
-    let explained = values
-        .iter()
-        .filter_map(|value| Some((value.get_name().to_owned(), value.get_help()?.to_string())));
-    let rows: Vec<String> = explained
-        .map(|(name, help)| row(&[&format!("`{name}`"), &help]))
-        .collect();
+    let rows: String = values.iter().filter_map(explained).collect();
     if rows.is_empty() || !takes_value(argument) {
         return String::new();
     }
-    format!(
-        "\nValues of `{}`:\n\n| value | meaning |\n| --- | --- |\n{}",
-        syntax(argument),
-        rows.concat()
-    )
+    let syntax = syntax(argument);
+    format!("\nValues of `{syntax}`:\n\n| value | meaning |\n| --- | --- |\n{rows}")
 }
 
 /// The parameters of a solve, listed once for all commands that take them.
@@ -208,12 +202,10 @@ fn parameters(root: &Command) -> String {
 
 /// The help text without its "[default: …]", and the default.
 fn meaning(argument: &Arg) -> (String, String) {
-    let help = argument
-        .get_help()
-        .map_or_else(String::new, ToString::to_string);
-    let stated = help
-        .strip_suffix(']')
-        .and_then(|rest| rest.rsplit_once(" [default: "));
+    let help = argument.get_help();
+    let help = help.map_or_else(String::new, ToString::to_string);
+    let stated = help.strip_suffix(']');
+    let stated = stated.and_then(|rest| rest.rsplit_once(" [default: "));
     if let Some((meaning, default)) = stated {
         return (meaning.to_owned(), default.to_owned());
     }
@@ -242,9 +234,8 @@ fn syntax(argument: &Arg) -> String {
 }
 
 fn takes_value(argument: &Arg) -> bool {
-    argument
-        .get_num_args()
-        .map_or(argument.get_action().takes_values(), |n| n.takes_values())
+    let number = argument.get_num_args();
+    number.map_or(argument.get_action().takes_values(), |n| n.takes_values())
 }
 
 /// A row of a Markdown table, with `|` and `<` escaped.

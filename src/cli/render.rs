@@ -3,7 +3,7 @@
 use crate::capture::read::camera_file;
 use crate::cli::numbers::{from_one, whole};
 use crate::cli::options::{DenoiseOptions, DeviceOptions, Replace};
-use crate::cli::saved::{Loaded, SavedOptions};
+use crate::cli::saved::SavedOptions;
 use crate::error::{Error, Result};
 use crate::export::exr::{Precision, write_rgb};
 use crate::export::light_layers;
@@ -60,30 +60,19 @@ pub struct RenderArguments {
 /// The results or the camera cannot be read, or the picture cannot be written.
 pub fn render(arguments: &RenderArguments) -> Result<()> {
     let ending = arguments.out.extension().and_then(|e| e.to_str());
+    let wrong = |problem, remedy| Err(Error::usage(arguments.out.display(), problem, remedy));
     let is_png = match ending.map(str::to_ascii_lowercase).as_deref() {
         Some("exr") => false,
         Some("png") => true,
-        _ => {
-            return Err(Error::usage(
-                arguments.out.display(),
-                "is neither .exr nor .png",
-                "choose one of these",
-            ));
-        }
+        _ => return wrong("is neither .exr nor .png", "choose one of these"),
     };
     if arguments.layers && is_png {
-        return Err(Error::usage(
-            arguments.out.display(),
-            "a .png has no layers",
-            "choose .exr with --layers",
-        ));
+        return wrong("a .png has no layers", "choose .exr with --layers");
     }
     if arguments.layers && arguments.device.device == Device::Gpu {
-        return Err(Error::usage(
-            "--device gpu",
-            "the light of each lamp is traced separately by the processor",
-            "leave out one of --layers and --device",
-        ));
+        let problem = "the light of each lamp is traced separately by the processor";
+        let remedy = "leave out one of --layers and --device";
+        return Err(Error::usage("--device gpu", problem, remedy));
     }
     arguments.replace.apply();
     overwrite::check(&arguments.out)?;
@@ -92,12 +81,8 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
         true => Renderer::processor(),
         false => arguments.device.renderer()?,
     };
-    let Loaded {
-        saved,
-        capture,
-        estimate,
-        ..
-    } = arguments.saved.load()?;
+    let loaded = arguments.saved.load()?;
+    let (capture, estimate, settings) = (loaded.capture, loaded.estimate, loaded.saved.settings);
     let (camera, frame) = match (arguments.frame, &arguments.camera) {
         (_, Some(path)) => {
             let (intrinsics, pose, remarks) = camera_file::read(path)?;
@@ -112,8 +97,8 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
         }
     };
     let lit = estimate.lit(&capture.scene);
-    let options = path_options(&saved.settings);
-    let (seed, frame, spp) = (saved.settings.seed, frame as u64, arguments.spp);
+    let options = path_options(&settings);
+    let (seed, frame, spp) = (settings.seed, frame as u64, arguments.spp);
     if arguments.layers {
         let split = Split::new(&lit);
         let layers = split.render(&lit, &camera, &options, seed, frame, spp);

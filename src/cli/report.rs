@@ -6,7 +6,6 @@ use crate::say;
 use crate::scene::Scene;
 use glam::Vec3;
 use std::borrow::Cow;
-use std::fmt::Write;
 
 /// Most rows printed; report.json has all.
 const ROWS: usize = 24;
@@ -36,24 +35,19 @@ pub fn objects(scene: &Scene, estimate: &Estimate) -> String {
             true => format!("{r:.3} {g:.3} {b:.3}"),
             false => "not determined".to_owned(),
         };
-        // Writing to a string cannot fail.
-        let _ = writeln!(
-            text,
-            "{name:width$}  {emission:>24}  {:>9}  {albedo:>17}  {:>7}  {:>8}",
-            error(object.emission_stderr, 4),
-            error(object.albedo_stderr, 3),
-            object.seen_pixels
-        );
+        let emission_error = error(object.emission_stderr, 4);
+        let (albedo_error, pixels) = (error(object.albedo_stderr, 3), object.seen_pixels);
+        text += &format!("{name:width$}  {emission:>24}  {emission_error:>9}  ");
+        text += &format!("{albedo:>17}  {albedo_error:>7}  {pixels:>8}\n");
     }
     if estimate.common_error > 0.0 {
-        let _ = writeln!(
-            text,
-            "one factor of all albedos together is known to ±{:.0} %; their ratios are known better",
+        text += &format!(
+            "one factor of all albedos together is known to ±{:.0} %; their ratios are known better\n",
             estimate.common_error * 100.0
         );
     }
     if rows.len() > shown {
-        let _ = writeln!(text, "… and {} more in report.json", rows.len() - shown);
+        text += &format!("… and {} more in report.json\n", rows.len() - shown);
     }
     text
 }

@@ -199,8 +199,7 @@ pub fn use_threads(threads: Option<u16>) -> Result<()> {
             "--threads {threads}: {used} are used, {MAX_THREADS_A_CORE} for each of the machine's {cores} cores"
         ));
     }
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(used)
-        .build_global()
-        .map_err(|error| Error::new("--threads", error, "name fewer threads"))
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(used);
+    let built = pool.build_global();
+    built.map_err(|error| Error::new("--threads", error, "name fewer threads"))
 }

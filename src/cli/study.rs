@@ -66,9 +66,8 @@ pub struct StudyArguments {
 }
 
 fn names() -> PossibleValuesParser {
-    let studies = STUDIES
-        .iter()
-        .map(|study| PossibleValue::new(study.name).help(study.question));
+    let named = |study: &Study| PossibleValue::new(study.name).help(study.question);
+    let studies = STUDIES.iter().map(named);
     PossibleValuesParser::new(studies.chain([PossibleValue::new(ALL).help("All of them")]))
 }
 
@@ -82,16 +81,13 @@ pub fn study(arguments: &StudyArguments) -> Result<()> {
     if let Some((rooms, family)) = arguments.rooms.zip(arguments.family.as_deref()) {
         return insertions(arguments, rooms, family);
     }
-    let wanted: Vec<&Study> = STUDIES
-        .iter()
-        .filter(|study| arguments.name == ALL || study.name == arguments.name)
-        .collect();
+    let is_wanted = |study: &&Study| arguments.name == ALL || study.name == arguments.name;
     let options = arguments.read.open(&Settings::default());
     let source = arguments.capture.clone().map(Source::Folder);
     let subject = source.map(|source| open(&source, &options)?.aligned()?.subject());
     let subject = subject.transpose()?;
     let quick = arguments.quick;
-    for study in wanted {
+    for study in STUDIES.iter().filter(is_wanted) {
         let seeds = if quick { QUICK_SEEDS } else { study.seeds };
         let bench = Bench {
             quick,

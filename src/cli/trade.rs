@@ -1,18 +1,18 @@
 //! `relit trade`: error over time of presets and settings, on a capture or on generated rooms.
 
-use crate::cli::families;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::numbers::{from_one, threads, whole};
 use crate::cli::options::{ReadOptions, Replace};
 use crate::cli::parameters::duration;
 use crate::cli::solve::use_threads;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::inverse::settings::{Preset, Settings};
 use crate::room::generated::Family;
 use crate::say;
 use crate::session::command::Source;
 use crate::session::open::open;
 use crate::session::snapshot::OpenCapture;
+use crate::study::families::{self, Plan, RoomEvent, Row};
 use crate::study::trade::plan::{self, Run};
 use crate::study::trade::{Curve, SolveEvent, Trade, combine, measure, rooms};
 use clap::Args;
@@ -20,6 +20,8 @@ use clap::builder::PossibleValuesParser;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+/// Selects all families, or all presets.
+const ALL: &str = "all";
 /// Default time for all solves of curves.
 const DEFAULT_TIME: Duration = Duration::from_secs(5 * 60);
 
@@ -35,7 +37,7 @@ pub struct TradeArguments {
     #[arg(long, value_name = "N", conflicts_with = "capture", value_parser = from_one::<u64>)]
     rooms: Option<u64>,
     /// The family of the generated rooms, or all of them [default: plain]
-    #[arg(long, value_name = "NAME", requires = "rooms", conflicts_with_all = ["presets", "around", "capture"], value_parser = PossibleValuesParser::new(families::names()))]
+    #[arg(long, value_name = "NAME", requires = "rooms", conflicts_with_all = ["presets", "around", "capture"], value_parser = PossibleValuesParser::new(Family::NAMES.into_iter().chain([ALL])))]
     family: Option<String>,
     /// The preset that generated rooms are solved with [default: balanced]
     #[arg(long, value_name = "PRESET", requires = "rooms", conflicts_with_all = ["presets", "around", "capture"], value_parser = PossibleValuesParser::new(Preset::WORDS))]
@@ -48,7 +50,7 @@ pub struct TradeArguments {
     #[arg(long)]
     presets: bool,
     /// Only one preset and variations of its settings, with equal times; `all` for all presets and variations
-    #[arg(long, value_name = "PRESET|all", conflicts_with = "presets", value_parser = PossibleValuesParser::new(Preset::WORDS.iter().copied().chain([families::ALL])))]
+    #[arg(long, value_name = "PRESET|all", conflicts_with = "presets", value_parser = PossibleValuesParser::new(Preset::WORDS.iter().copied().chain([ALL])))]
     around: Option<String>,
     /// Random seed, and seed of the first generated room
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u64>)]
@@ -104,9 +106,7 @@ pub fn trade(arguments: &TradeArguments) -> Result<i32> {
         && arguments.around.is_none()
     {
         let out = arguments.out.clone().unwrap_or_else(rooms_folder);
-        let family = arguments.family.as_deref().unwrap_or(Family::Plain.name());
-        let (preset, seeds) = (arguments.preset(), arguments.seeds(count));
-        families::families(&out, family, preset, seeds, arguments.time, &interrupt)?;
+        of_families(arguments, &out, count, &interrupt)?;
         return Ok(interrupt.exit_code());
     }
     let base = Settings {
@@ -114,7 +114,7 @@ pub fn trade(arguments: &TradeArguments) -> Result<i32> {
         ..Settings::default()
     };
     let runs = match &arguments.around {
-        Some(preset) if preset != families::ALL => plan::around(preset, &base),
+        Some(preset) if preset != ALL => plan::around(preset, &base),
         Some(_) => plan::everything(&base),
         None if arguments.presets => plan::presets(&base),
         None => plan::everything(&base),
@@ -137,6 +137,60 @@ pub fn trade(arguments: &TradeArguments) -> Result<i32> {
     say::table(&trade.words());
     say::line(format_args!("results in {}", folder.display()));
     Ok(interrupt.exit_code())
+}
+
+/// Solves generated rooms of the named families. Starts no further room after the time. Writes rooms.csv, rooms.json and
+/// rooms.png, and prints a table.
+///
+/// # Errors
+/// The results cannot be written, or a room could not be solved.
+fn of_families(
+    arguments: &TradeArguments,
+    out: &Path,
+    count: u64,
+    interrupt: &Interrupt,
+) -> Result<()> {
+    let family = arguments.family.as_deref().unwrap_or(Family::Plain.name());
+    let named = |one: &Family| family == ALL || family == one.name();
+    let plan = Plan {
+        families: Family::ALL.into_iter().filter(named).collect(),
+        seeds: arguments.seeds(count).collect(),
+        size: rooms::SIZE,
+        preset: arguments.preset(),
+    };
+    let started = Instant::now();
+    let is_over = |time: Duration| started.elapsed() >= time;
+    let stopped = || interrupt.requested() || arguments.time.is_some_and(is_over);
+    let mut failed: Option<Error> = None;
+    let summary = families::run(out, &plan, &stopped, &mut |event| match event {
+        RoomEvent::Begins(family, seed) => {
+            say::note(format_args!("{} room {seed} …", family.name()))
+        }
+        RoomEvent::Solved(row) => say::note(solved(row)),
+        RoomEvent::Failed(error) => {
+            say::note(error);
+            failed.get_or_insert(error.clone());
+        }
+    })?;
+    say::table(&summary.words());
+    say::line(format_args!("results in {}", out.display()));
+    failed.map_or(Ok(()), Err)
+}
+
+fn solved(row: &Row) -> String {
+    let percent =
+        |fraction: Option<f64>| fraction.map_or("-".to_owned(), |f| format!("{:.0} %", f * 100.0));
+    let error = row.albedo_mae.map_or("-".to_owned(), |e| format!("{e:.4}"));
+    format!(
+        "{} room {}: albedo error {error} after {:.1} s, {} of {} lamps, {} false, {} within two standard errors",
+        row.family.name(),
+        row.seed,
+        row.seconds,
+        row.lamps_found,
+        row.lamps_true,
+        row.lamps_false,
+        percent(row.coverage_2)
+    )
 }
 
 fn of_capture(
@@ -197,12 +251,10 @@ fn print_progress(event: SolveEvent) {
 
 fn ending(curve: &Curve) -> String {
     match (curve.points.last(), curve.ended) {
-        (Some(end), Some(why)) => format!(
-            "error {:.5} after {:.2} s ({})",
-            end.error,
-            end.seconds,
-            why.word()
-        ),
+        (Some(end), Some(why)) => {
+            let (error, seconds, why) = (end.error, end.seconds, why.word());
+            format!("error {error:.5} after {seconds:.2} s ({why})")
+        }
         _ => "no estimate in its time".to_owned(),
     }
 }

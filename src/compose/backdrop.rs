@@ -63,14 +63,12 @@ impl Backdrop {
         let picture = photograph.picture();
         let size = (camera.intrinsics.width, camera.intrinsics.height);
         if !picture.is_whole() || size != (picture.width, picture.height) {
-            return Err(Error::new(
-                format!("frame {frame}"),
-                format!(
-                    "the photograph is {} × {}, its camera {} × {}",
-                    picture.width, picture.height, size.0, size.1
-                ),
-                "give both one size",
-            ));
+            let problem = format!(
+                "the photograph is {} × {}, its camera {} × {}",
+                picture.width, picture.height, size.0, size.1
+            );
+            let place = format!("frame {frame}");
+            return Err(Error::new(place, problem, "give both one size"));
         }
         Ok(Self {
             finish: PsfAndGrain::default(),
@@ -115,9 +113,8 @@ impl Backdrop {
         let alphas: Vec<f32> = layers.iter().map(|layer| layer.alpha).collect();
         let alphas = self.finish.softened(&alphas, size);
         let soft = |value: &(dyn Fn(usize, &LayeredPixel) -> Vec3 + Sync)| {
-            let values: Vec<Vec3> = (layers.par_iter().enumerate())
-                .map(|(pixel, layer)| value(pixel, layer))
-                .collect();
+            let layers = layers.par_iter().enumerate();
+            let values: Vec<Vec3> = layers.map(|(i, layer)| value(i, layer)).collect();
             self.finish.softened(&values, size)
         };
         let covers = soft(&|pixel, layer| layer.with * layer.alpha * self.exposure_at(pixel));
@@ -155,9 +152,9 @@ impl Backdrop {
         Vec3::select(saturated, bound, light)
     }
 
-    /// The photograph's exposed light at a pixel if its radiance changed from `before` to `after` in the estimate: multiplied by their
-    /// ratio, so that the photograph's own albedo and detail count (Marschner and Greenberg 1997). Beyond [`MAX_RATIO`] light is added,
-    /// since dark pixels hold no detail to amplify.
+    /// The photograph's exposed light at a pixel if its radiance changed from `before` to `after` in the estimate: multiplied by
+    /// their ratio, so that the photograph's own albedo and detail count (Marschner and Greenberg 1997). Beyond [`MAX_RATIO`] light
+    /// is added, since dark pixels hold no detail to amplify.
     pub fn changed_light(&self, pixel: usize, before: Vec3, after: Vec3) -> Vec3 {
         let light = self.background_light(pixel, before);
         let lit = before.cmpgt(Vec3::ZERO);
@@ -166,8 +163,8 @@ impl Backdrop {
         light * ratio + added
     }
 
-    /// Exposed light of a pixel beside what covers it: α · with + (1 − α) · beside is the composite. With `with` as the mean of object
-    /// and uncovered part, that is α · object + (1 − α) · [`Backdrop::changed_light`].
+    /// Exposed light of a pixel beside what covers it: α · with + (1 − α) · beside is the composite. With `with` as the mean of
+    /// object and uncovered part, that is α · object + (1 − α) · [`Backdrop::changed_light`].
     fn beside(&self, pixel: usize, layer: &LayeredPixel) -> Vec3 {
         let outline = (layer.with - layer.uncovered) * self.exposure_at(pixel);
         outline + self.changed_light(pixel, layer.without, layer.uncovered)
@@ -202,6 +199,7 @@ impl Backdrop {
 mod tests {
     use super::*;
     use crate::capture::camera::{Intrinsics, Pose};
+    use crate::capture::photograph::Encoding;
     use glam::{DVec3, Vec2};
 
     const SIDE: u32 = 40;
@@ -210,7 +208,8 @@ mod tests {
 
     /// A square object with a shadow to its right, in front of a grey photograph with given blur and grain.
     fn composite(finish: PsfAndGrain) -> Vec<f32> {
-        let backdrop = backdrop(finish, Vec3::ONE);
+        let mut backdrop = backdrop(Vec3::ONE);
+        backdrop.finish = finish;
         let layers: Vec<LayeredPixel> = (0..SIDE * SIDE)
             .map(|pixel| {
                 let (x, y) = (pixel % SIDE, pixel / SIDE);
@@ -231,18 +230,12 @@ mod tests {
     }
 
     /// A grey photograph with a given saturation.
-    fn backdrop(finish: PsfAndGrain, saturation: Vec3) -> Backdrop {
+    fn backdrop(saturation: Vec3) -> Backdrop {
         let intrinsics = Intrinsics::plain([SIDE; 2], [40.0; 2], [20.0; 2]);
-        let photograph = Picture::from_fn(SIDE, SIDE, |_, _| Vec3::splat(LEVEL));
-        Backdrop {
-            frame: 4,
-            camera: Camera::new(&intrinsics, &Pose::default(), DVec3::ZERO),
-            photograph: Arc::new(photograph),
-            exposure: Exposure::default(),
-            saturation,
-            finish,
-            shown_at: 1.0,
-        }
+        let camera = Camera::new(&intrinsics, &Pose::default(), DVec3::ZERO);
+        let pixels = vec![Vec3::splat(LEVEL); (SIDE * SIDE) as usize];
+        let grey = Photograph::new([SIDE; 2], pixels, Encoding::Linear, saturation);
+        Backdrop::new(4, &camera, &grey, Exposure::default()).expect("one size")
     }
 
     fn at(pixels: &[f32], x: u32, y: u32) -> f32 {
@@ -270,7 +263,7 @@ mod tests {
 
     #[test]
     fn a_shadow_takes_its_share_of_the_light_that_the_photograph_shows() {
-        let linear = backdrop(PsfAndGrain::default(), Vec3::INFINITY);
+        let linear = backdrop(Vec3::INFINITY);
         let shown = |without: f32, uncovered: f32| {
             let [without, uncovered] = [without, uncovered].map(Vec3::splat);
             let layer = LayeredPixel {
@@ -300,10 +293,9 @@ mod tests {
             grain: vec![(0.5, Vec3::splat(0.02))],
         };
         let grainy = composite(finish.clone());
-        let inside: Vec<f64> = (12..22)
-            .flat_map(|y| (12..22).map(move |x| (x, y)))
-            .map(|(x, y)| f64::from(at(&grainy, x, y) - OBJECT))
-            .collect();
+        let inside = (12..22).flat_map(|y| (12..22).map(move |x| (x, y)));
+        let off = |(x, y)| f64::from(at(&grainy, x, y) - OBJECT);
+        let inside: Vec<f64> = inside.map(off).collect();
         let variance = inside.iter().map(|v| v * v).sum::<f64>() / inside.len() as f64;
         assert!((variance.sqrt() / 0.02 - 1.0).abs() < 0.2, "{variance}");
         assert_eq!(at(&grainy, 5, 17), LEVEL);

@@ -26,9 +26,9 @@ impl DenoisedLight {
     pub fn new(halves: [&Insertion; 2], denoiser: Denoiser) -> Self {
         let [a, b] = halves.map(Insertion::alpha);
         let alpha: Vec<f32> = a.iter().zip(&b).map(|(a, b)| (a + b) * 0.5).collect();
-        let (lit, camera) = (halves[0].lit(), &halves[0].backdrop().camera);
+        let (lit, camera) = (&halves[0].lit, &halves[0].backdrop().camera);
 
-        let world = FurnishedScene::new(lit, halves[0].objects());
+        let world = FurnishedScene::new(lit, &halves[0].objects);
         let object_guides = guides_where(&world, camera, |pixel, ray| {
             alpha[pixel] > 0.0 && world.sees_object(ray)
         });
@@ -55,14 +55,10 @@ impl DenoisedLight {
             alpha,
         }
     }
-
-    /// The pixels of the composite.
-    fn layered(&self) -> Vec<LayeredPixel> {
-        layered(&self.alpha, &self.object, &self.without, &self.change)
-    }
 }
 
-/// Pixels of which objects cover a fraction `alpha`, from the objects' radiance, that without them, and what they change beside them.
+/// Pixels of which objects cover a fraction `alpha`, from the objects' radiance, that without them, and what they change beside
+/// them.
 pub(super) fn layered(
     alpha: &[f32],
     object: &Picture,
@@ -96,13 +92,17 @@ pub(super) fn unlit(guides: &[Option<Guide>]) -> Vec<Option<Guide>> {
 ///
 /// Pixels that no object changes in either, nor within the reach of the filter, keep the photograph's value to the bit.
 pub fn denoised_composite(halves: [&Insertion; 2], denoiser: Denoiser) -> Picture {
-    let layered = DenoisedLight::new(halves, denoiser).layered();
-    halves[0].backdrop().composite(&layered)
+    composited(halves, denoiser).0
 }
 
 /// [`denoised_composite`] and its layers.
 pub fn denoised(halves: [&Insertion; 2], denoiser: Denoiser) -> (Picture, Layers) {
-    let layered = DenoisedLight::new(halves, denoiser).layered();
-    let composite = halves[0].backdrop().composite(&layered);
+    let (composite, layered) = composited(halves, denoiser);
     (composite, halves[0].layers_of(&layered))
+}
+
+fn composited(halves: [&Insertion; 2], denoiser: Denoiser) -> (Picture, Vec<LayeredPixel>) {
+    let light = DenoisedLight::new(halves, denoiser);
+    let layered = layered(&light.alpha, &light.object, &light.without, &light.change);
+    (halves[0].backdrop().composite(&layered), layered)
 }

@@ -16,7 +16,7 @@ const SAMPLES: u32 = 1;
 
 /// The pixels of `insertion`, whose own samples are not used. Pixels that no object changes near by are exactly unchanged.
 pub fn first_look(insertion: &Insertion) -> Vec<LayeredPixel> {
-    let seeds = [insertion.seed(), insertion.seed().wrapping_add(1)];
+    let seeds = [insertion.seed, insertion.seed.wrapping_add(1)];
     let halves = seeds.map(|seed| {
         let mut half = insertion.smaller(LONG_SIDE, seed);
         half.pass(SAMPLES);
@@ -25,23 +25,25 @@ pub fn first_look(insertion: &Insertion) -> Vec<LayeredPixel> {
     let mut small = DenoisedLight::new(halves.each_ref(), Denoiser::Builtin);
     lend_to_what_was_missed(&mut small.object, &small.object_guides);
 
-    let (lit, camera) = (insertion.lit(), &insertion.backdrop().camera);
+    let (lit, camera) = (&insertion.lit, &insertion.backdrop().camera);
     let size = [camera.intrinsics.width, camera.intrinsics.height];
-    let seen = guides_at_centers(&FurnishedScene::new(lit, insertion.objects()), camera);
+    let seen = guides_at_centers(&FurnishedScene::new(lit, &insertion.objects), camera);
     let object = upsample(&small.object, &small.object_guides, size, &seen);
     let without = upsample(&small.without, &small.without_guides, size, &seen);
     let dark = unlit(&small.without_guides);
     let change = upsample(&small.change, &dark, size, &unlit(&seen));
 
     let first_object = lit.scene.objects.len();
-    let covered = |guide: &Option<Guide>| guide.is_some_and(|g| g.object as usize >= first_object);
-    let alpha: Vec<f32> = (seen.iter())
-        .map(|guide| f32::from(u8::from(covered(guide))))
-        .collect();
+    let alpha = |guide: &Option<Guide>| {
+        let covered = guide.is_some_and(|g| g.object as usize >= first_object);
+        f32::from(u8::from(covered))
+    };
+    let alpha: Vec<f32> = seen.iter().map(alpha).collect();
     layered(&alpha, &object, &without, &change)
 }
 
-/// Gives the mean light of the objects to the pixels that see none: the render may have missed thin parts, which take it from there.
+/// Gives the mean light of the objects to the pixels that see none: the render may have missed thin parts, which take it from
+/// there.
 fn lend_to_what_was_missed(object: &mut Picture, guides: &[Option<Guide>]) {
     let (mut light, mut count) = (Vec3::ZERO, 0.0);
     for (radiance, guide) in object.pixels.iter().zip(guides) {

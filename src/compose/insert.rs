@@ -1,5 +1,5 @@
-//! Differential rendering (Debevec 1998): changes the photograph by the ratio of renders with and without the objects, and covers it
-//! with the objects.
+//! Differential rendering (Debevec 1998): changes the photograph by the ratio of renders with and without the objects, and covers
+//! it with the objects.
 //!
 //! Both renders use the same random numbers. Paths that meet no object cancel to the bit, so the photograph is unchanged
 //! wherever the objects have no effect.
@@ -24,10 +24,13 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub struct Insertion {
     backdrop: Backdrop,
-    lit: Arc<LitScene>,
-    objects: Vec<Arc<PlacedObject>>,
+    /// The scene and its light.
+    pub lit: Arc<LitScene>,
+    /// The objects inserted.
+    pub objects: Vec<Arc<PlacedObject>>,
     options: PathOptions,
-    seed: u64,
+    /// Keys the random numbers.
+    pub seed: u64,
     pixels: Vec<PairSums>,
     /// Samples per pixel of each row so far.
     row_samples: Vec<u32>,
@@ -248,17 +251,11 @@ impl Insertion {
         let world = FurnishedScene::new(&self.lit, &self.objects);
         let camera = &self.backdrop.camera;
         let forward = camera.forward();
-        (0..self.pixels.len())
-            .into_par_iter()
-            .map(|pixel| {
-                let ray = self.ray(pixel, [0.5; 2]);
-                world
-                    .intersect(&ray)
-                    .map_or((f32::INFINITY, u32::MAX), |s| {
-                        ((s.point - camera.center).dot(forward), s.object)
-                    })
-            })
-            .unzip()
+        let seen = |pixel: usize| match world.intersect(&self.ray(pixel, [0.5; 2])) {
+            Some(s) => ((s.point - camera.center).dot(forward), s.object),
+            None => (f32::INFINITY, u32::MAX),
+        };
+        (0..self.pixels.len()).into_par_iter().map(seen).unzip()
     }
 
     /// The layers of the composite.
@@ -281,11 +278,6 @@ impl Insertion {
         }
     }
 
-    /// Keys the random numbers.
-    pub fn seed(&self) -> u64 {
-        self.seed
-    }
-
     /// The photograph that is inserted into.
     pub fn backdrop(&self) -> &Backdrop {
         &self.backdrop
@@ -294,16 +286,6 @@ impl Insertion {
     /// Replaces the photograph by another one of the same view.
     pub fn set_photograph(&mut self, photograph: Arc<Picture>) {
         self.backdrop.photograph = photograph;
-    }
-
-    /// The scene and its light.
-    pub fn lit(&self) -> &Arc<LitScene> {
-        &self.lit
-    }
-
-    /// The objects inserted.
-    pub fn objects(&self) -> &[Arc<PlacedObject>] {
-        &self.objects
     }
 
     /// Fewest samples of any pixel.
@@ -336,11 +318,8 @@ impl Insertion {
     fn means(&self, pixel: usize) -> (Vec3, Vec3, f32) {
         let sums = &self.pixels[pixel];
         let n = f64::from(self.row_samples[pixel / self.width()].max(1));
-        (
-            (sums.with / n).as_vec3(),
-            (sums.without / n).as_vec3(),
-            (f64::from(sums.covered) / n) as f32,
-        )
+        let [with, without] = [sums.with, sums.without].map(|sum| (sum / n).as_vec3());
+        (with, without, (f64::from(sums.covered) / n) as f32)
     }
 
     /// The ray through a pixel, at an offset in [0, 1)² from its corner.
@@ -349,14 +328,10 @@ impl Insertion {
         self.backdrop.camera.ray(corner + Vec2::from(offset))
     }
 
-    fn stream(&self, pixel: usize, sample: u32) -> Stream {
-        let frame = self.backdrop.frame;
-        Stream::new(self.seed, frame, pixel as u64, u64::from(sample))
-    }
-
     /// A pair of paths through a pixel, with and without the objects, from the same random numbers.
     fn pair(&self, world: &FurnishedScene<'_>, pixel: usize, sample: u32) -> PairSums {
-        let mut stream = self.stream(pixel, sample);
+        let frame = self.backdrop.frame;
+        let mut stream = Stream::new(self.seed, frame, pixel as u64, u64::from(sample));
         let ray = self.ray(pixel, stream.uniform2());
         let mut again = stream.clone();
         let covered = world.sees_object(&ray);
@@ -370,21 +345,18 @@ impl Insertion {
         };
         let rejected = with.rejected || without.rejected;
         // If one of the pair is rejected both are, or the difference would be biased.
-        let keep = |sample: PathSample| {
-            if rejected {
-                DVec3::ZERO
-            } else {
-                sample.radiance.as_dvec3()
-            }
-        };
+        let [kept, kept_without] = [with, without].map(|sample| match rejected {
+            true => DVec3::ZERO,
+            false => sample.radiance.as_dvec3(),
+        });
         let of_covered = |value: DVec3| if covered { value } else { DVec3::ZERO };
         PairSums {
-            with: keep(with),
-            without: keep(without),
-            covered_with: of_covered(keep(with)),
-            covered_without: of_covered(keep(without)),
+            with: kept,
+            without: kept_without,
+            covered_with: of_covered(kept),
+            covered_without: of_covered(kept_without),
             covered: u32::from(covered),
-            changed: covered || keep(with) != keep(without),
+            changed: covered || kept != kept_without,
             rays: with.rays + without.rays,
             rejected: u32::from(rejected),
         }
@@ -393,16 +365,15 @@ impl Insertion {
     /// Adds one sample to every pixel of some rows.
     fn add_rows(&mut self, first: usize, rows: usize) {
         let width = self.width();
-        let added: Vec<Vec<PairSums>> = (first..first + rows)
-            .into_par_iter()
-            .map(|row| {
-                let world = FurnishedScene::new(&self.lit, &self.objects);
-                let sample = self.row_samples[row];
-                (row * width..(row + 1) * width)
-                    .map(|pixel| self.pair(&world, pixel, sample))
-                    .collect()
-            })
-            .collect();
+        let sampled = |row: usize| -> Vec<PairSums> {
+            let world = FurnishedScene::new(&self.lit, &self.objects);
+            let (pixels, sample) = (row * width..(row + 1) * width, self.row_samples[row]);
+            pixels
+                .map(|pixel| self.pair(&world, pixel, sample))
+                .collect()
+        };
+        let rows_of_all = (first..first + rows).into_par_iter();
+        let added: Vec<Vec<PairSums>> = rows_of_all.map(sampled).collect();
         self.accumulate(first..first + rows, 1, &added.concat());
     }
 }

@@ -43,9 +43,7 @@ pub fn harmonics_of_photographs<'a>(
                 if !color.is_finite() {
                     continue;
                 }
-                let d = camera
-                    .ray(Vec2::new(x as f32 + 0.5, y as f32 + 0.5))
-                    .direction;
+                let d = camera.ray(Vec2::new(x as f32, y as f32) + 0.5).direction;
                 // Bands of equal height on a sphere have equal solid angle.
                 let row = ((d.z + 1.0) * 0.5 * rows as f32) as usize;
                 let turn = (d.y.atan2(d.x) / (2.0 * PI)).rem_euclid(1.0);
@@ -70,11 +68,8 @@ pub fn harmonics_of_photographs<'a>(
             1.0 - ((index / columns) as f32 + 0.5) / rows as f32,
             ((index % columns) as f32 + 0.5) / columns as f32,
         ];
-        harmonics.add(
-            warp::uniform_sphere(u),
-            color.unwrap_or(mean).as_vec3(),
-            solid_angle,
-        );
+        let color = color.unwrap_or(mean).as_vec3();
+        harmonics.add(warp::uniform_sphere(u), color, solid_angle);
     }
     harmonics
 }
@@ -87,23 +82,18 @@ pub fn harmonics_of_estimate(
     seed: u64,
 ) -> Harmonics {
     let count = PROBE_SIDE * PROBE_SIDE;
-    let found: Vec<(Vec3, Vec3)> = (0..count)
-        .into_par_iter()
-        .map(|index| {
-            let mut stream = Stream::new(seed, 0, index as u64, 0);
-            let [du, dv] = stream.uniform2();
-            let u = [
-                ((index / PROBE_SIDE) as f32 + du) / PROBE_SIDE as f32,
-                ((index % PROBE_SIDE) as f32 + dv) / PROBE_SIDE as f32,
-            ];
-            let direction = warp::uniform_sphere(u);
-            let ray = Ray::new(point, direction);
-            (
-                direction,
-                radiance(lit, &ray, &mut stream, options).radiance,
-            )
-        })
-        .collect();
+    let arriving = |index: usize| {
+        let mut stream = Stream::new(seed, 0, index as u64, 0);
+        let [du, dv] = stream.uniform2();
+        let u = [
+            ((index / PROBE_SIDE) as f32 + du) / PROBE_SIDE as f32,
+            ((index % PROBE_SIDE) as f32 + dv) / PROBE_SIDE as f32,
+        ];
+        let ray = Ray::new(point, warp::uniform_sphere(u));
+        let sample = radiance(lit, &ray, &mut stream, options);
+        (ray.direction, sample.radiance)
+    };
+    let found: Vec<(Vec3, Vec3)> = (0..count).into_par_iter().map(arriving).collect();
     let mut harmonics = Harmonics::default();
     for (direction, color) in found {
         harmonics.add(direction, color, 4.0 * std::f64::consts::PI / count as f64);
@@ -148,11 +138,9 @@ impl Pasted {
                 let light =
                     seen.and_then(|s| Some((s, harmonics.get((s.object - first) as usize)?)));
                 if let Some((surface, harmonics)) = light {
-                    let side = surface.normal.dot(ray.direction);
-                    let normal = if side > 0.0 {
-                        -surface.shading_normal
-                    } else {
-                        surface.shading_normal
+                    let normal = match surface.normal.dot(ray.direction) > 0.0 {
+                        true => -surface.shading_normal,
+                        false => surface.shading_normal,
                     };
                     // Nine harmonics cannot represent gloss: specular reflectance is treated as diffuse.
                     let specular = surface.lobe.map_or(Vec3::ZERO, |lobe| lobe.specular);
@@ -166,18 +154,13 @@ impl Pasted {
             (covered > 0).then(|| {
                 let light = sum / covered as f32 * exposure.at(lens, size, pixel);
                 let alpha = covered as f32 / cells;
-                (
-                    pixel,
-                    exposure.value(light, backdrop.saturation) * alpha,
-                    alpha,
-                )
+                let value = exposure.value(light, backdrop.saturation);
+                (pixel, value * alpha, alpha)
             })
         };
+        let pixels = (0..backdrop.photograph.pixels.len()).into_par_iter();
         Self {
-            covered: (0..backdrop.photograph.pixels.len())
-                .into_par_iter()
-                .filter_map(covered)
-                .collect(),
+            covered: pixels.filter_map(covered).collect(),
             saturation: backdrop.saturation,
         }
     }

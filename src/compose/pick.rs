@@ -25,13 +25,10 @@ pub fn pick(scene: &Scene, camera: &Camera, pixel: Vec2) -> Option<Pick> {
     let ray = camera.ray(pixel);
     let hit = scene.intersect(&ray)?;
     let normal = scene.normals[hit.triangle as usize];
+    let is_back = normal.dot(ray.direction) > 0.0;
     Some(Pick {
         point: scene.point(&hit),
-        normal: if normal.dot(ray.direction) > 0.0 {
-            -normal
-        } else {
-            normal
-        },
+        normal: if is_back { -normal } else { normal },
         object: scene.object_of[hit.triangle as usize],
     })
 }
@@ -40,9 +37,8 @@ pub fn pick(scene: &Scene, camera: &Camera, pixel: Vec2) -> Option<Pick> {
 pub fn below(scene: &Scene, pick: &Pick) -> Option<Vec3> {
     let down = -scene.up;
     let from = offset_origin(pick.point, pick.normal, &[pick.point; 3], pick.normal);
-    scene
-        .intersect(&Ray::new(from, down))
-        .map(|hit| scene.point(&hit))
+    let hit = scene.intersect(&Ray::new(from, down))?;
+    Some(scene.point(&hit))
 }
 
 /// How far an object falls along the scene's down direction until a corner meets a surface. `None` where nothing is below.
@@ -51,14 +47,10 @@ pub fn below(scene: &Scene, pick: &Pick) -> Option<Vec3> {
 pub fn fall(scene: &Scene, object: &PlacedObject, lift: f32) -> Option<f32> {
     let corners = object.corners.len() * 3;
     let stride = corners.div_ceil(MAX_FALLING).max(1);
-    object
-        .corners
-        .iter()
-        .flatten()
-        .step_by(stride)
-        .filter_map(|&corner| {
-            let ray = Ray::new(corner + scene.up * lift, -scene.up);
-            scene.intersect(&ray).map(|hit| hit.t - lift)
-        })
-        .min_by(f32::total_cmp)
+    let falls = |&corner: &Vec3| {
+        let ray = Ray::new(corner + scene.up * lift, -scene.up);
+        scene.intersect(&ray).map(|hit| hit.t - lift)
+    };
+    let chosen = object.corners.iter().flatten().step_by(stride);
+    chosen.filter_map(falls).min_by(f32::total_cmp)
 }

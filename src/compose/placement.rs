@@ -69,19 +69,14 @@ impl Placement {
     /// The scale is not positive, or a number is not finite.
     pub fn transform(&self, base: DVec3, up: DVec3) -> Result<DAffine3> {
         if !(self.scale.is_finite() && self.scale > 0.0) {
-            return Err(Error::usage(
-                "--scale",
-                format!("{} is no size", self.scale),
-                "give a number above 0",
-            ));
+            let problem = format!("{} is no size", self.scale);
+            return Err(Error::usage("--scale", problem, "give a number above 0"));
         }
         let turned = self.rotate.is_finite() && self.tilt.is_finite();
         if !turned || !self.at.is_none_or(DVec3::is_finite) {
-            return Err(Error::usage(
-                "--at, --rotate, --tilt",
-                "a number is not finite",
-                "give finite numbers",
-            ));
+            let problem = "a number is not finite";
+            let remedy = "give finite numbers";
+            return Err(Error::usage("--at, --rotate, --tilt", problem, remedy));
         }
         let turn = DQuat::from_axis_angle(up, self.rotate.to_radians());
         let tilt = self.tilt_rotation();
@@ -129,35 +124,23 @@ impl PlacedObject {
             Some(material) => Arc::new(model.as_ref().clone().with_material(material)),
             None => model,
         };
-        let corners: Vec<[Vec3; 3]> = model
-            .corners
-            .iter()
-            .map(|c| c.map(|p| (transform.transform_point3(p) - scene.origin).as_vec3()))
-            .collect();
+        let placed = |p: DVec3| (transform.transform_point3(p) - scene.origin).as_vec3();
+        let corners: Vec<[Vec3; 3]> = model.corners.iter().map(|c| c.map(placed)).collect();
         if !corners.iter().flatten().all(|p| p.is_finite()) {
-            return Err(Error::file(
-                &placement.file,
-                "is placed outside the range of coordinates",
-                "check --at and --scale",
-            ));
+            let problem = "is placed outside the range of coordinates";
+            let remedy = "check --at and --scale";
+            return Err(Error::file(&placement.file, problem, remedy));
         }
         let turned = |n: DVec3| (rotation * n).normalize_or_zero().as_vec3();
-        let normals = model
-            .corners
-            .iter()
-            .map(|[a, b, c]| turned((*b - *a).cross(*c - *a).normalize_or_zero()))
-            .collect();
-        let corner_normals = model
-            .corner_normals
-            .iter()
-            .map(|corner| corner.map(|n| turned(n.as_dvec3())))
-            .collect();
+        let normal = |[a, b, c]: &[DVec3; 3]| (*b - *a).cross(*c - *a).normalize_or_zero();
+        let normals = model.corners.iter().map(|c| turned(normal(c))).collect();
+        let own = model.corner_normals.iter();
+        let corner_normals = own.map(|n| n.map(|n| turned(n.as_dvec3()))).collect();
         let positions: Vec<Vec3> = corners.iter().flatten().copied().collect();
         let low = positions.iter().copied().fold(Vec3::INFINITY, Vec3::min);
         let high = (positions.iter().copied()).fold(Vec3::NEG_INFINITY, Vec3::max);
-        let indices: Vec<[u32; 3]> = (0..corners.len() as u32)
-            .map(|i| [3 * i, 3 * i + 1, 3 * i + 2])
-            .collect();
+        let triangles = 0..corners.len() as u32;
+        let indices: Vec<_> = triangles.map(|i| [0, 1, 2].map(|k| 3 * i + k)).collect();
         Ok(Self {
             bvh: Bvh::new(&positions, &indices),
             model,
@@ -192,20 +175,16 @@ impl PlacedObject {
     /// The unit shading normal at a hit, on the front side.
     pub fn shading_normal(&self, hit: &Hit) -> Vec3 {
         let geometric = self.normals[hit.triangle as usize];
-        self.corner_normals
-            .get(hit.triangle as usize)
-            .map_or(geometric, |n| interpolate(n, hit).normalize_or(geometric))
+        let own = self.corner_normals.get(hit.triangle as usize);
+        own.map_or(geometric, |n| interpolate(n, hit).normalize_or(geometric))
     }
 
     /// Diffuse reflectance at a hit, times the vertex colours.
     pub fn albedo(&self, hit: &Hit) -> Vec3 {
         let triangle = hit.triangle as usize;
         let material = &self.model.materials[self.model.material_of[triangle] as usize];
-        let tint = self
-            .model
-            .corner_colors
-            .get(triangle)
-            .map_or(Vec3::ONE, |colors| interpolate(colors, hit));
+        let colors = self.model.corner_colors.get(triangle);
+        let tint = colors.map_or(Vec3::ONE, |colors| interpolate(colors, hit));
         (material.albedo_at(hit) * tint).clamp(Vec3::ZERO, Vec3::ONE)
     }
 }

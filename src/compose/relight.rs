@@ -213,8 +213,8 @@ mod tests {
 
     use crate::capture::camera::{Intrinsics, Pose};
     use crate::capture::exposure::Exposure;
+    use crate::capture::photograph::{Encoding, Photograph};
     use crate::capture::response::Response;
-    use crate::compose::psf_and_grain::PsfAndGrain;
     use crate::scene::camera::Camera;
     use glam::DVec3;
 
@@ -225,15 +225,10 @@ mod tests {
 
     fn by(exposure: Exposure, photograph: f32, before: f32, after: f32, saturation: f32) -> f32 {
         let intrinsics = Intrinsics::plain([1; 2], [1.0; 2], [0.5; 2]);
-        let backdrop = Backdrop {
-            frame: 0,
-            camera: Camera::new(&intrinsics, &Pose::default(), DVec3::ZERO),
-            photograph: Arc::new(Picture::from_fn(1, 1, |_, _| Vec3::splat(photograph))),
-            exposure,
-            saturation: Vec3::splat(saturation),
-            finish: PsfAndGrain::default(),
-            shown_at: 1.0,
-        };
+        let camera = Camera::new(&intrinsics, &Pose::default(), DVec3::ZERO);
+        let [pixel, saturation] = [photograph, saturation].map(Vec3::splat);
+        let taken = Photograph::new([1; 2], vec![pixel], Encoding::Linear, saturation);
+        let backdrop = Backdrop::new(0, &camera, &taken, exposure).expect("one size");
         let picture = relit(&backdrop, &[Vec3::splat(before)], &[Vec3::splat(after)]);
         picture.pixels[0].y
     }

@@ -64,15 +64,12 @@ impl<'a> FurnishedScene<'a> {
         let corners = object.corners[triangle];
         let normal = object.normals[triangle];
         let material = &object.model.materials[object.model.material_of[triangle] as usize];
+        let back = -ray.direction.normalize_or_zero();
         SurfacePoint {
             point: interpolate(&corners, hit),
             corners,
             normal,
-            shading_normal: towards_viewer(
-                object.shading_normal(hit),
-                normal,
-                -ray.direction.normalize_or_zero(),
-            ),
+            shading_normal: towards_viewer(object.shading_normal(hit), normal, back),
             albedo: object.albedo(hit),
             emission: Vec3::ZERO,
             lobe: material.lobe,

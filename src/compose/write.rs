@@ -86,7 +86,8 @@ pub fn write_relit(prefix: &Path, backdrop: &Backdrop) -> Result<[PathBuf; 2]> {
     Ok([exr, png])
 }
 
-fn with_ending(prefix: &Path, ending: &str) -> PathBuf {
+/// A path with more letters at its end.
+pub fn with_ending(prefix: &Path, ending: &str) -> PathBuf {
     let mut name = OsString::from(prefix);
     name.push(ending);
     PathBuf::from(name)

@@ -114,9 +114,8 @@ fn pack(
     let padded = |t: u32| side(t) + 2 * MARGIN;
     let area: u64 = triangles.iter().map(|&t| u64::from(padded(t)).pow(2)).sum();
     let widest = triangles.iter().map(|&t| padded(t)).max()?;
-    let width = ((area as f64).sqrt().ceil() as u32)
-        .max(widest)
-        .next_multiple_of(4);
+    let side_of_all = (area as f64).sqrt().ceil() as u32;
+    let width = side_of_all.max(widest).next_multiple_of(4);
     let (mut x, mut y, mut row) = (0, 0, 0);
     let mut charts = Vec::with_capacity(triangles.len());
     for &triangle in triangles {
@@ -152,21 +151,15 @@ mod tests {
         for chart in charts {
             for y in chart.y - MARGIN..chart.y + chart.side + MARGIN {
                 for x in chart.x - MARGIN..chart.x + chart.side + MARGIN {
-                    assert!(!std::mem::replace(
-                        &mut taken[(y * width + x) as usize],
-                        true
-                    ));
+                    let taken = &mut taken[(y * width + x) as usize];
+                    assert!(!std::mem::replace(taken, true));
                     used += 1;
                 }
             }
         }
-        assert!(
-            used * 10 > 7 * width * height,
-            "{used} of {width} × {height}"
-        );
-        let large = |_| 512;
-        assert!(
-            pack(&triangles, large, false).is_none() && pack(&triangles, large, true).is_some()
-        );
+        let all = width * height;
+        assert!(used * 10 > 7 * all, "{used} of {all}");
+        let packed = |any_size| pack(&triangles, |_| 512, any_size).is_some();
+        assert!(!packed(false) && packed(true));
     }
 }

@@ -25,11 +25,8 @@ pub fn write_atomically(
     let io = |error: std::io::Error| Error::io(path, &error);
     // Renaming would replace a device or pipe by a file.
     if std::fs::metadata(path).is_ok_and(|there| !there.is_file()) {
-        return Err(Error::file(
-            path,
-            "exists and is no regular file",
-            "name another file",
-        ));
+        let problem = "exists and is no regular file";
+        return Err(Error::file(path, problem, "name another file"));
     }
     overwrite::check(path)?;
     let folder = folder_of(path);
@@ -41,11 +38,10 @@ pub fn write_atomically(
     write(&mut writer).map_err(|error| match error.downcast::<std::io::Error>() {
         Ok(error) => Error::io(path, &error),
         // The encoders' own errors may hide that the disk is full.
-        Err(error) => Error::file(
-            path,
-            error,
-            "nothing was written there; see whether the disk has room for it",
-        ),
+        Err(error) => {
+            let remedy = "nothing was written there; see whether the disk has room for it";
+            Error::file(path, error, remedy)
+        }
     })?;
     writer.flush().map_err(io)?;
     temporary.as_file().sync_all().map_err(io)?;

@@ -1,9 +1,18 @@
 //! An 8-bit picture for drawing text and pictures, with a built-in font.
 
-use plotters::prelude::{BitMapBackend, DrawingBackend, FontStyle, IntoFont, RGBColor};
+use crate::error::{Error, Result};
+use crate::export::picture::write_png_bytes;
+use plotters::coord::Shift;
+use plotters::prelude::{
+    BitMapBackend, DrawingArea, DrawingBackend, FontStyle, IntoDrawingArea, IntoFont, RGBColor,
+};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{IntoTextStyle, register_font};
+use std::path::Path;
 use std::sync::Once;
+
+/// What plotters draws into.
+pub type PlotArea<'a> = DrawingArea<BitMapBackend<'a>, Shift>;
 
 /// Name under which plotters finds the built-in font.
 pub const FONT: &str = "sans-serif";
@@ -40,6 +49,14 @@ impl Canvas {
         }
     }
 
+    /// Writes the canvas as a PNG.
+    ///
+    /// # Errors
+    /// The file cannot be written, or the canvas has no pixels.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        write_png_bytes(path, self.width, self.height, &self.bytes)
+    }
+
     /// Copies sRGB bytes of a picture `width` pixels wide, with its top-left corner at (x, y). Clips what falls outside.
     pub fn paste(&mut self, bytes: &[u8], width: u32, x: u32, y: u32) {
         if width == 0 || x >= self.width {
@@ -74,6 +91,27 @@ impl Canvas {
         // A picture without its text is still of use, so a failure is ignored.
         let _ = backend.draw_text(text, &style, (x as i32, y as i32));
     }
+}
+
+/// Why a plot could not be drawn.
+pub type DrawError = Box<dyn std::error::Error>;
+
+/// Writes a PNG of a size that plotters draws into; it begins white.
+///
+/// # Errors
+/// It cannot be drawn, or the file cannot be written.
+pub fn write_plot(
+    path: &Path,
+    size: (u32, u32),
+    draw: impl FnOnce(&PlotArea<'_>) -> std::result::Result<(), DrawError>,
+) -> Result<()> {
+    register_fonts();
+    let mut canvas = Canvas::new(size.0, size.1, [255; 3]);
+    let area = BitMapBackend::with_buffer(&mut canvas.bytes, size).into_drawing_area();
+    let drawn = draw(&area).and_then(|()| Ok(area.present()?));
+    drawn.map_err(|error| Error::file(path, error, "nothing was written there"))?;
+    drop(area);
+    canvas.write(path)
 }
 
 #[cfg(test)]

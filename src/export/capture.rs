@@ -54,7 +54,7 @@ pub fn write_transforms(
         exposure: None,
         depth: None,
     };
-    let entries: Vec<Entry> = cameras.enumerate().map(entry).collect();
+    let entries: Vec<_> = cameras.enumerate().map(entry).collect();
     let text = format!("{:#}\n", transforms(&entries, "mesh.obj", Some(up)));
     write_bytes(&folder.join(CAMERAS), text.as_bytes())
 }
@@ -124,20 +124,12 @@ pub fn transforms(entries: &[Entry], mesh_path: &str, up: Option<DVec3>) -> Valu
 }
 
 fn add_lens(fields: &mut Value, k: &Intrinsics) {
-    let [k1, k2, p1, p2] = k.distortion;
-    for (name, value) in [
-        ("w", json!(k.width)),
-        ("h", json!(k.height)),
-        ("fl_x", json!(k.fx)),
-        ("fl_y", json!(k.fy)),
-        ("cx", json!(k.cx)),
-        ("cy", json!(k.cy)),
-        ("k1", json!(k1)),
-        ("k2", json!(k2)),
-        ("p1", json!(p1)),
-        ("p2", json!(p2)),
-    ] {
-        fields[name] = value;
+    fields["w"] = json!(k.width);
+    fields["h"] = json!(k.height);
+    let names = ["fl_x", "fl_y", "cx", "cy", "k1", "k2", "p1", "p2"];
+    let lens = [k.fx, k.fy, k.cx, k.cy].into_iter().chain(k.distortion);
+    for (name, value) in names.into_iter().zip(lens) {
+        fields[name] = json!(value);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::export::canvas::Canvas;
-use crate::export::picture::{to_srgb_bytes, write_png_bytes};
+use crate::export::picture::to_srgb_bytes;
 use crate::math::picture::Picture;
 use std::path::Path;
 
@@ -30,33 +30,23 @@ pub fn write_grid(
     exposure: f32,
 ) -> Result<()> {
     if let Some((caption, _)) = pictures.iter().find(|(_, picture)| !picture.is_whole()) {
-        return Err(Error::file(
-            path,
-            format!("\"{caption}\" has no pixels"),
-            "",
-        ));
+        let problem = format!("\"{caption}\" has no pixels");
+        return Err(Error::file(path, problem, ""));
     }
     let cell_width = pictures.iter().map(|(_, p)| p.width).max().unwrap_or(0);
     let cell_height = pictures.iter().map(|(_, p)| p.height).max().unwrap_or(0) + CAPTION;
     let columns = columns.clamp(1, pictures.len().max(1));
     let rows = pictures.len().div_ceil(columns);
-    let mut canvas = Canvas::new(
-        columns as u32 * (cell_width + GAP) - GAP.min(columns as u32 * (cell_width + GAP)),
-        rows as u32 * cell_height,
-        [255; 3],
-    );
+    let width = (columns as u32 * (cell_width + GAP)).saturating_sub(GAP);
+    let mut canvas = Canvas::new(width, rows as u32 * cell_height, [255; 3]);
     for (index, (caption, picture)) in pictures.iter().enumerate() {
         let x = (index % columns) as u32 * (cell_width + GAP);
         let y = (index / columns) as u32 * cell_height;
         canvas.text(caption, x + picture.width / 2, y + CAPTION / 2, 15, [30; 3]);
-        canvas.paste(
-            &to_srgb_bytes(picture, exposure),
-            picture.width,
-            x,
-            y + CAPTION,
-        );
+        let bytes = to_srgb_bytes(picture, exposure);
+        canvas.paste(&bytes, picture.width, x, y + CAPTION);
     }
-    write_png_bytes(path, canvas.width, canvas.height, &canvas.bytes)
+    canvas.write(path)
 }
 
 #[cfg(test)]

@@ -80,34 +80,25 @@ pub fn write_layers(path: &Path, width: u32, height: u32, layers: Vec<Layer>) ->
     }
 
     let size = Vec2(width as usize, height as usize);
-    let exr_layers: Vec<_> = layers
-        .into_iter()
-        .map(|layer| {
-            let channels = layer.channels.into_iter();
-            let channels = channels.map(|(name, samples)| AnyChannel::new(name, samples));
-            let attributes = if layer.name.is_empty() {
-                LayerAttributes::default()
-            } else {
-                LayerAttributes::named(Text::from(layer.name.as_str()))
-            };
-            exr::prelude::Layer::new(
-                size,
-                attributes,
-                Encoding::SMALL_LOSSLESS,
-                AnyChannels::sort(channels.collect()),
-            )
-        })
-        .collect();
+    let exr_layer = |layer: Layer| {
+        let channels = layer.channels.into_iter();
+        let channels = channels.map(|(name, samples)| AnyChannel::new(name, samples));
+        let channels = AnyChannels::sort(channels.collect());
+        let attributes = match layer.name.as_str() {
+            "" => LayerAttributes::default(),
+            name => LayerAttributes::named(Text::from(name)),
+        };
+        exr::prelude::Layer::new(size, attributes, Encoding::SMALL_LOSSLESS, channels)
+    };
+    let exr_layers: Vec<_> = layers.into_iter().map(exr_layer).collect();
     let attributes = ImageAttributes::new(IntegerBounds::from_dimensions(size));
     let image = Image::from_layers(attributes, exr_layers);
     write_atomically(path, |writer| {
-        image
-            .write()
-            .to_buffered(writer)
-            .map_err(|error| match error {
-                exr::error::Error::Io(error) => error.into(),
-                other => other.into(),
-            })
+        let written = image.write().to_buffered(writer);
+        written.map_err(|error| match error {
+            exr::error::Error::Io(error) => error.into(),
+            other => other.into(),
+        })
     })
 }
 
@@ -134,10 +125,8 @@ mod tests {
             for (pixel, expected) in image.pixels().zip(&picture.pixels) {
                 let difference = (Vec3::from(pixel.0) - *expected).abs();
                 let allowed = expected.abs() * tolerance + tolerance * 1e-6;
-                assert!(
-                    (difference - allowed).max_element() <= 0.0,
-                    "{expected} {difference}"
-                );
+                let off = (difference - allowed).max_element();
+                assert!(off <= 0.0, "{expected} {difference}");
             }
         }
     }
@@ -154,23 +143,18 @@ mod tests {
         ];
         write_layers(&path, 37, 21, layers.into()).expect("written");
         let image = exr::prelude::read_all_flat_layers_from_file(&path).expect("an EXR file");
-        let find = |name: &str| {
-            image
-                .layer_data
-                .iter()
-                .find(|l| l.attributes.layer_name.as_ref() == Some(&Text::from(name)))
-                .expect("the layer is there")
+        let channels = |name: &str| {
+            let name = Some(Text::from(name));
+            let mut layers = image.layer_data.iter();
+            let layer = layers.find(|l| l.attributes.layer_name == name);
+            &layer.expect("the layer is there").channel_data.list
         };
-        let green = &find("with").channel_data.list[1];
+        let green = &channels("with")[1];
         assert_eq!(green.name, Text::from("G"));
-        assert_eq!(
-            green.sample_data,
-            FlatSamples::F32(picture.pixels.iter().map(|c| c.y).collect())
-        );
-        assert_eq!(
-            find("object id").channel_data.list[0].sample_data,
-            FlatSamples::U32(ids)
-        );
+        let values = picture.pixels.iter().map(|c| c.y).collect();
+        assert_eq!(green.sample_data, FlatSamples::F32(values));
+        let id = &channels("object id")[0];
+        assert_eq!(id.sample_data, FlatSamples::U32(ids));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::export::canvas::Canvas;
-use crate::export::picture::{percentile_exposure, write_png_bytes};
+use crate::export::picture::percentile_exposure;
 use crate::export::scale::Scale;
 use crate::math::color::luminance;
 use crate::math::picture::Picture;
@@ -77,8 +77,9 @@ fn three_digits(value: f32) -> String {
         .map_or_else(|_| value.to_string(), |v: f64| Scale::format(&v))
 }
 
-/// Writes the luminance of a picture and a legend. The legend's right end is the 99th percentile of the finite magnitudes, their maximum
-/// if it is zero, and 1 if all are zero; `low` is its left end as a fraction of it, `color_of` the colour of such fractions.
+/// Writes the luminance of a picture and a legend. The legend's right end is the 99th percentile of the finite magnitudes, their
+/// maximum if it is zero, and 1 if all are zero; `low` is its left end as a fraction of it, `color_of` the colour of such
+/// fractions.
 fn write(
     path: &Path,
     picture: &Picture,
@@ -112,7 +113,7 @@ fn write(
     for (x, label) in labels {
         canvas.text(&label, x, height + 24, 12, [40; 3]);
     }
-    write_png_bytes(path, canvas.width, canvas.height, &canvas.bytes)
+    canvas.write(path)
 }
 
 #[cfg(test)]

@@ -31,10 +31,7 @@ pub fn write(path: &Path, scene: &Scene, parts: &[Part], atlas: Option<&Picture>
         let encoded = png_bytes(atlas, 1.0).map_err(|error| Error::file(path, error, ""))?;
         file.image(&encoded);
     }
-    let mut nodes = Vec::new();
-    for part in parts {
-        nodes.push(file.part(part));
-    }
+    let mut nodes: Vec<_> = parts.iter().map(|part| file.part(part)).collect();
     for (index, camera) in scene.cameras.iter().enumerate() {
         nodes.push(file.camera(index, camera, scene));
     }
@@ -44,11 +41,8 @@ pub fn write(path: &Path, scene: &Scene, parts: &[Part], atlas: Option<&Picture>
         .map_err(|error| Error::file(path, error, "nothing was written there"))?;
     if u32::try_from(text.len() + file.bytes.len() + 64).is_err() {
         let remedy = "export as ply or obj, or estimate with fewer texels";
-        return Err(Error::file(
-            path,
-            "the scene is larger than a GLB file can be",
-            remedy,
-        ));
+        let problem = "the scene is larger than a GLB file can be";
+        return Err(Error::file(path, problem, remedy));
     }
     let glb = gltf::binary::Glb {
         header: gltf::binary::Header {
@@ -81,15 +75,10 @@ impl Document {
         };
         let floats = positions.iter().flat_map(|p| p.to_array());
         let bytes = floats.map(f32::to_le_bytes);
-        let accessor = self.accessor(bytes, ComponentType::F32, Type::Vec3);
-        attributes.insert(
-            Valid(Semantic::Positions),
-            self.root.push(json::Accessor {
-                min: ends(Vec3::INFINITY, Vec3::min),
-                max: ends(Vec3::NEG_INFINITY, Vec3::max),
-                ..accessor
-            }),
-        );
+        let mut accessor = self.accessor(bytes, ComponentType::F32, Type::Vec3);
+        accessor.min = ends(Vec3::INFINITY, Vec3::min);
+        accessor.max = ends(Vec3::NEG_INFINITY, Vec3::max);
+        attributes.insert(Valid(Semantic::Positions), self.root.push(accessor));
         if !part.uvs.is_empty() {
             let floats = part.uvs.iter().flat_map(|uv| uv.to_array());
             let bytes = floats.map(f32::to_le_bytes);
@@ -125,10 +114,9 @@ impl Document {
     fn material(&mut self, part: &Part) -> json::Index<json::Material> {
         let estimate = &part.estimate;
         let texture = self.atlas.filter(|_| !part.uvs.is_empty());
-        let color = if texture.is_none() {
-            estimate.albedo.clamp(Vec3::ZERO, Vec3::ONE)
-        } else {
-            Vec3::ONE
+        let color = match texture {
+            Some(_) => Vec3::ONE,
+            None => estimate.albedo.clamp(Vec3::ZERO, Vec3::ONE),
         };
         let brightest = estimate.emission.max_element();
         let strength = brightest.max(1.0);
@@ -142,9 +130,8 @@ impl Document {
                 self.root.extensions_used.push(name);
             }
         }
-        let roughness = estimate
-            .roughness
-            .map_or(1.0, |alpha| alpha.max(0.0).sqrt().min(1.0));
+        let roughness = |alpha: f32| alpha.max(0.0).sqrt().min(1.0);
+        let roughness = estimate.roughness.map_or(1.0, roughness);
         self.root.push(json::Material {
             name: Some(part.name.clone()),
             double_sided: true,
@@ -171,10 +158,9 @@ impl Document {
     fn camera(&mut self, index: usize, camera: &Camera, scene: &Scene) -> json::Index<json::Node> {
         let lens = &camera.intrinsics;
         let name = Some(format!("camera {index:03}"));
+        let aspect = f64::from(lens.width) / f64::from(lens.height) * lens.fy / lens.fx;
         let perspective = json::camera::Perspective {
-            aspect_ratio: Some(
-                (f64::from(lens.width) / f64::from(lens.height) * lens.fy / lens.fx) as f32,
-            ),
+            aspect_ratio: Some(aspect as f32),
             yfov: (2.0 * (f64::from(lens.height) * 0.5 / lens.fy).atan()) as f32,
             zfar: None,
             znear: scene.diameter * 1e-4,

@@ -21,22 +21,14 @@ use std::path::Path;
 /// The folder is not empty, an image is broken, or a file cannot be written.
 pub fn write(folder: &Path, import: &Import) -> Result<()> {
     let staging = NewFolder::new(folder)?;
-    let entries: Result<Vec<Entry>> = import
-        .frames
-        .par_iter()
-        .enumerate()
+    let frames = import.frames.par_iter().enumerate();
+    let entries: Result<Vec<Entry>> = frames
         .map(|(index, frame)| write_frame(staging.path(), index, frame))
         .collect();
-    ply::write_mesh(
-        &staging.path().join("mesh.ply"),
-        &import.mesh,
-        import.has_objects,
-    )?;
-    let file = transforms(&entries?, "mesh.ply", import.up);
-    write_bytes(
-        &staging.path().join(CAMERAS),
-        format!("{file:#}\n").as_bytes(),
-    )?;
+    let mesh = staging.path().join("mesh.ply");
+    ply::write_mesh(&mesh, &import.mesh, import.has_objects)?;
+    let text = format!("{:#}\n", transforms(&entries?, "mesh.ply", import.up));
+    write_bytes(&staging.path().join(CAMERAS), text.as_bytes())?;
     staging.commit()
 }
 
@@ -47,30 +39,22 @@ fn write_frame(folder: &Path, index: usize, frame: &ImportedFrame) -> Result<Ent
         let header = image::header(&frame.photograph)?;
         let k = &frame.lens.pinhole;
         if (header.width, header.height) != (k.width, k.height) {
-            return Err(Error::file(
-                &frame.photograph,
-                format!(
-                    "is {}×{} pixels, but its camera {}×{}",
-                    header.width, header.height, k.width, k.height
-                ),
-                "use photographs of the camera's size",
-            ));
+            let problem = format!(
+                "is {}×{} pixels, but its camera {}×{}",
+                header.width, header.height, k.width, k.height
+            );
+            let remedy = "use photographs of the camera's size";
+            return Err(Error::file(&frame.photograph, problem, remedy));
         }
-        let ending = frame
-            .photograph
-            .extension()
-            .map(|e| e.to_string_lossy().to_ascii_lowercase())
-            .filter(|e| e.chars().all(|c| c.is_ascii_alphanumeric()))
+        let ending = frame.photograph.extension();
+        let ending = ending.map(|e| e.to_string_lossy().to_ascii_lowercase());
+        let ending = (ending.filter(|e| e.chars().all(|c| c.is_ascii_alphanumeric())))
             .unwrap_or_else(|| "png".into());
         copy(&frame.photograph, &folder.join(format!("{name}.{ending}")))?;
         ending
     } else {
-        let (mut photograph, _) = image::read(
-            &frame.photograph,
-            Orientation::default(),
-            &frame.lens.pinhole,
-            None,
-        )?;
+        let (path, upright) = (&frame.photograph, Orientation::default());
+        let (mut photograph, _) = image::read(path, upright, &frame.lens.pinhole, None)?;
         if let Some(mask) = &frame.mask {
             apply_mask(&mut photograph, mask, &frame.lens)?;
         }
@@ -79,17 +63,13 @@ fn write_frame(folder: &Path, index: usize, frame: &ImportedFrame) -> Result<Ent
         }
         resample::write_photograph(&folder.join(&name), &photograph)?.to_owned()
     };
-    let depth = frame
-        .depth
-        .as_ref()
-        .filter(|depth| depth.is_registered_to(&frame.lens));
-    let depth = match depth {
-        Some(depth) => {
+    let depth = match &frame.depth {
+        Some(depth) if depth.is_registered_to(&frame.lens) => {
             let name = format!("depth/{index:05}.png");
             write_depth(&folder.join(&name), depth)?;
             Some((name, depth.metres_per_unit))
         }
-        None => None,
+        _ => None,
     };
     Ok(Entry {
         file_path: format!("{name}.{ending}"),

@@ -39,11 +39,9 @@ pub fn write<'a>(
         named.push(Layer::rgb(&name, picture, Precision::Float));
     }
     let Some((width, height)) = size else {
-        return Err(Error::file(
-            path,
-            "nothing emits light in this estimate, so there are no layers",
-            "continue the solve, or give an object an emission",
-        ));
+        let problem = "nothing emits light in this estimate, so there are no layers";
+        let remedy = "continue the solve, or give an object an emission";
+        return Err(Error::file(path, problem, remedy));
     };
     write_layers(path, width, height, named)
 }

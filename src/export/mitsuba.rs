@@ -79,11 +79,9 @@ fn bsdf(xml: &mut String, part: &Part) -> std::fmt::Result {
     }
     if let Some((alpha, specular)) = lobe {
         let (roughness, level) = (alpha.max(0.0).sqrt(), (specular / 0.08).clamp(0.0, 1.0));
-        writeln!(
-            xml,
-            r#"      <float name="roughness" value="{roughness}"/>"#
-        )?;
-        writeln!(xml, r#"      <float name="specular" value="{level}"/>"#)?;
+        for (name, value) in [("roughness", roughness), ("specular", level)] {
+            writeln!(xml, r#"      <float name="{name}" value="{value}"/>"#)?;
+        }
     }
     writeln!(xml, "    </bsdf></bsdf>")
 }

@@ -30,14 +30,12 @@ impl NewFolder {
             Err(e) => return Err(Error::io(place, &e)),
         };
         if !is_empty && !overwrite::is_permitted() {
-            return Err(Error::file(
-                place,
-                match place.join(CAMERAS).exists() {
-                    true => "holds a capture",
-                    false => "is not empty",
-                },
-                "name a new folder, or add --overwrite to replace what has the same names",
-            ));
+            let problem = match place.join(CAMERAS).exists() {
+                true => "holds a capture",
+                false => "is not empty",
+            };
+            let remedy = "name a new folder, or add --overwrite to replace what has the same names";
+            return Err(Error::file(place, problem, remedy));
         }
         let parent = folder_of(place);
         let temporary = fs::create_dir_all(parent)

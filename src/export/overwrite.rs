@@ -117,11 +117,10 @@ pub fn check_results(folder: &Path, capture: &CaptureId) -> Result<()> {
     }
     let other = OTHER_FILES.iter().map(|name| folder.join(name));
     match other.into_iter().find(|path| !is_results && path.exists()) {
-        Some(path) => Err(Error::file(
-            &path,
-            "exists and belongs to no results of relit",
-            remedy,
-        )),
+        Some(path) => {
+            let problem = "exists and belongs to no results of relit";
+            Err(Error::file(&path, problem, remedy))
+        }
         None => Ok(()),
     }
 }
@@ -210,14 +209,11 @@ fn role_in_capture(folder: &Path, name: &Path, place: &Path) -> Option<&'static 
     };
     let frames = file.get("frames").and_then(Value::as_array);
     frames.into_iter().flatten().find_map(|frame| {
-        [
-            ("file_path", "a photograph"),
-            ("depth_file_path", "a depth image"),
-            ("mask_path", "a mask"),
-        ]
-        .into_iter()
-        .find(|(field, _)| named(frame, field).as_ref().is_some_and(is_beside))
-        .map(|(_, what)| what)
+        let is = |field: &str| named(frame, field).as_ref().is_some_and(is_beside);
+        let depth = || is("depth_file_path").then_some("a depth image");
+        let mask = || is("mask_path").then_some("a mask");
+        let photograph = is("file_path").then_some("a photograph");
+        photograph.or_else(depth).or_else(mask)
     })
 }
 
@@ -294,10 +290,8 @@ mod tests {
         for name in ours.split_whitespace().chain([by_another_path]) {
             let refused = &format!("room/{name}");
             let error = check(&at(refused)).expect_err(refused);
-            assert!(
-                error.place.contains(refused) && error.remedy.contains("--overwrite"),
-                "{error}"
-            );
+            let said = error.place.contains(refused) && error.remedy.contains("--overwrite");
+            assert!(said, "{error}");
         }
         let new = "images/a/new.png out/checkpoint.json ../new/folder/000.exr ../mesh.obj";
         for free in others.split(' ').chain(new.split(' ')) {
@@ -325,14 +319,9 @@ mod tests {
         check_results(&at("out"), &own("1", "room")).expect("there is nothing");
         write(at("out/loss.csv"), "mine");
         check_results(&at("out"), &own("1", "room")).expect_err("a table of someone's");
-        for (name, text) in [
-            (ESTIMATE, estimate.to_owned()),
-            (
-                CHECKPOINT,
-                format!("{{\"estimate\": {estimate}, \"checkpoint\": null}}"),
-            ),
-        ] {
-            write(at("out").join(name), &text);
+        let checkpoint = format!("{{\"estimate\": {estimate}, \"checkpoint\": null}}");
+        for (name, text) in [(ESTIMATE, estimate), (CHECKPOINT, &checkpoint)] {
+            write(at("out").join(name), text);
             check_results(&at("out"), &own("1", "elsewhere")).expect("the same content");
             check_results(&at("out"), &own("2", "room")).expect("changed since");
             let error = check_results(&at("out"), &own("2", "hall")).expect_err("another capture");

@@ -2,7 +2,7 @@
 
 use crate::export::atlas::Atlas;
 use crate::inverse::estimate::{Estimate, ObjectEstimate, TexelEstimate};
-use crate::scene::Scene;
+use crate::scene::{Object, Scene};
 use glam::{DVec3, Vec2, Vec3};
 use std::collections::HashMap;
 
@@ -47,32 +47,26 @@ fn cut(
     estimate: &Estimate,
     textured: impl Fn(&mut Part, &[u32], &TexelEstimate),
 ) -> Vec<Part> {
-    let unknown = ObjectEstimate::default();
-    scene
-        .objects
-        .iter()
-        .enumerate()
-        .filter(|(_, object)| !object.triangles.is_empty())
-        .map(|(index, object)| {
-            let texels = estimate
-                .texels
-                .as_deref()
-                .filter(|texels| texels.textured.get(index) == Some(&true));
-            let mut part = Part {
-                name: object.name.clone(),
-                estimate: estimate.objects.get(index).unwrap_or(&unknown).clone(),
-                positions: Vec::new(),
-                triangles: Vec::new(),
-                colors: Vec::new(),
-                uvs: Vec::new(),
-            };
-            match texels {
-                Some(texels) => textured(&mut part, &object.triangles, texels),
-                None => part.add_triangles(scene, &object.triangles),
+    let part = |(index, object): (usize, &Object)| {
+        let mut part = Part {
+            name: object.name.clone(),
+            estimate: estimate.objects.get(index).cloned().unwrap_or_default(),
+            positions: Vec::new(),
+            triangles: Vec::new(),
+            colors: Vec::new(),
+            uvs: Vec::new(),
+        };
+        match estimate.texels.as_deref() {
+            Some(texels) if texels.textured.get(index) == Some(&true) => {
+                textured(&mut part, &object.triangles, texels);
             }
-            part
-        })
-        .collect()
+            _ => part.add_triangles(scene, &object.triangles),
+        }
+        part
+    };
+    let objects = scene.objects.iter().enumerate();
+    let seen = objects.filter(|(_, object)| !object.triangles.is_empty());
+    seen.map(part).collect()
 }
 
 impl Part {
@@ -98,9 +92,8 @@ impl Part {
                 continue;
             };
             let start = self.positions.len() as u32;
-            let corners = scene.corners(triangle);
-            self.positions
-                .extend(corners.map(|local| local.as_dvec3() + scene.origin));
+            let corners = scene.corners(triangle).map(|p| p.as_dvec3() + scene.origin);
+            self.positions.extend(corners);
             self.uvs.extend(uvs);
             self.triangles.push([start, start + 1, start + 2]);
         }
@@ -117,8 +110,8 @@ impl Part {
                 for [b1, b2] in layout.corners(triangle as usize, texel) {
                     let local = a + (b - a) * f64::from(b1) + (c - a) * f64::from(b2);
                     self.positions.push(local + scene.origin);
-                    self.colors
-                        .push(texels.colors.colors[(first + texel) as usize]);
+                    let color = texels.colors.colors[(first + texel) as usize];
+                    self.colors.push(color);
                 }
                 self.triangles.push([start, start + 1, start + 2]);
             }

@@ -13,22 +13,16 @@ use std::path::Path;
 /// If that percentile is not positive (a black picture with few lights), it maps the largest value to 1. It is 1 for a picture
 /// without positive values.
 pub fn percentile_exposure(pixels: &[glam::Vec3]) -> f32 {
-    let mut values: Vec<f32> = pixels
-        .iter()
-        .flat_map(|c| c.to_array())
-        .filter(|v| v.is_finite())
-        .collect();
+    let channels = pixels.iter().flat_map(|c| c.to_array());
+    let mut values: Vec<f32> = channels.filter(|v| v.is_finite()).collect();
     if values.is_empty() {
         return 1.0;
     }
     let brightest = values.iter().copied().fold(0.0, f32::max);
     let rank = (values.len() - 1) * 99 / 100;
     let (_, percentile, _) = values.select_nth_unstable_by(rank, f32::total_cmp);
-    let white = if *percentile > 0.0 {
-        *percentile
-    } else {
-        brightest
-    };
+    let is_black = *percentile <= 0.0;
+    let white = if is_black { brightest } else { *percentile };
     if white > 0.0 { white.recip() } else { 1.0 }
 }
 
@@ -43,11 +37,8 @@ pub fn shown_at(saturation: glam::Vec3, pixels: &[glam::Vec3]) -> f32 {
 
 /// 8-bit sRGB bytes of a linear picture times an exposure.
 pub fn to_srgb_bytes(picture: &Picture, exposure: f32) -> Vec<u8> {
-    picture
-        .pixels
-        .iter()
-        .flat_map(|&c| to_srgb8(c, exposure))
-        .collect()
+    let pixels = picture.pixels.iter();
+    pixels.flat_map(|&c| to_srgb8(c, exposure)).collect()
 }
 
 /// Writes a linear picture times an exposure as an 8-bit sRGB PNG. NaN shows as magenta.
@@ -65,12 +56,9 @@ pub fn write_png(path: &Path, picture: &Picture, exposure: f32) -> Result<()> {
 /// The picture has no pixels.
 pub fn png_bytes(picture: &Picture, exposure: f32) -> image::ImageResult<Vec<u8>> {
     let mut encoded = Vec::new();
-    PngEncoder::new(&mut encoded).write_image(
-        &to_srgb_bytes(picture, exposure),
-        picture.width,
-        picture.height,
-        ExtendedColorType::Rgb8,
-    )?;
+    let (bytes, format) = (to_srgb_bytes(picture, exposure), ExtendedColorType::Rgb8);
+    let encoder = PngEncoder::new(&mut encoded);
+    encoder.write_image(&bytes, picture.width, picture.height, format)?;
     Ok(encoded)
 }
 

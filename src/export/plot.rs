@@ -1,13 +1,12 @@
 //! Line plots as PNG, with linear or logarithmic axes, without system fonts.
 
-use crate::error::{Error, Result};
-use crate::export::canvas::{Canvas, FONT, register_fonts};
-use crate::export::picture::write_png_bytes;
+use crate::error::Result;
+use crate::export::canvas::{DrawError, FONT, PlotArea, write_plot};
 use crate::export::scale::Scale;
 use crate::inverse::solver::{FitPoint, LossPoint, Stage};
 use plotters::prelude::{
-    BLACK, BitMapBackend, ChartBuilder, Circle, Color, EmptyElement, IntoDrawingArea, IntoFont,
-    LineSeries, PathElement, Polygon, RGBColor, Rectangle, SeriesLabelPosition, Text, WHITE,
+    BLACK, ChartBuilder, Circle, Color, EmptyElement, IntoFont, LineSeries, PathElement, Polygon,
+    RGBColor, Rectangle, SeriesLabelPosition, Text, WHITE,
 };
 use plotters::style::TextStyle;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -98,15 +97,10 @@ impl Plot {
     /// # Errors
     /// The file cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
-        register_fonts();
-        let mut canvas = Canvas::new(SIZE.0, SIZE.1, [255; 3]);
-        self.draw(&mut canvas.bytes)
-            .map_err(|error| Error::file(path, error, "nothing was written there"))?;
-        write_png_bytes(path, canvas.width, canvas.height, &canvas.bytes)
+        write_plot(path, SIZE, |area| self.draw(area))
     }
 
-    /// Draws into an sRGB buffer of [`SIZE`].
-    fn draw(&self, bytes: &mut [u8]) -> std::result::Result<(), Box<dyn std::error::Error + '_>> {
+    fn draw(&self, area: &PlotArea<'_>) -> std::result::Result<(), DrawError> {
         let shown = |p: &[f64; 2]| self.x.shows(p[0]) && self.y.shows(p[1]);
         let all = || self.series.iter().flat_map(|s| &s.points);
         let ends = self.series.iter().flat_map(|s| s.band.iter().flatten());
@@ -117,9 +111,7 @@ impl Plot {
         let (bottom, top) = (y_scale.low(), y_scale.high());
 
         // Axes.
-        let area = BitMapBackend::with_buffer(bytes, SIZE).into_drawing_area();
-        area.fill(&WHITE)?;
-        let mut chart = ChartBuilder::on(&area)
+        let mut chart = ChartBuilder::on(area)
             .caption(&self.title, (FONT, 24))
             .margin(14)
             .x_label_area_size(48)
@@ -158,32 +150,19 @@ impl Plot {
                 let outline: Vec<_> = lower.into_iter().chain(upper.into_iter().rev()).collect();
                 chart.draw_series([Polygon::new(outline, color.mix(0.18).filled())])?;
             }
-            let points: Vec<(f64, f64)> = series
-                .points
-                .iter()
-                .filter(|p| shown(p))
-                .map(|p| (p[0], p[1]))
-                .collect();
-            let (color, points) = match series.draw {
-                Draw::Steps => (BLACK, steps(&points)),
-                Draw::Line | Draw::Dots => (*color, points),
-            };
-            let radius = match series.draw {
-                Draw::Line if points.len() <= 40 => 4,
-                Draw::Dots => 2,
-                Draw::Line | Draw::Steps => 0,
+            let points = series.points.iter().filter(|p| shown(p));
+            let points: Vec<(f64, f64)> = points.map(|p| (p[0], p[1])).collect();
+            // Colour, radius of the dots, points and width of the line.
+            let (color, radius, line, width) = match series.draw {
+                Draw::Line if points.len() <= 40 => (*color, 4, points.clone(), 2),
+                Draw::Line => (*color, 0, points.clone(), 2),
+                Draw::Dots => (*color, 2, Vec::new(), 2),
+                Draw::Steps => (BLACK, 0, steps(&points), 1),
             };
             if radius > 0 {
-                let dots = points
-                    .iter()
-                    .map(|&p| Circle::new(p, radius, color.filled()));
-                chart.draw_series(dots)?;
+                let dot = |&p: &(f64, f64)| Circle::new(p, radius, color.filled());
+                chart.draw_series(points.iter().map(dot))?;
             }
-            let line = match series.draw {
-                Draw::Dots => Vec::new(),
-                Draw::Line | Draw::Steps => points,
-            };
-            let width = if series.draw == Draw::Steps { 1 } else { 2 };
             chart
                 .draw_series(LineSeries::new(line, color.stroke_width(width)))?
                 .label(&series.name)
@@ -214,7 +193,6 @@ impl Plot {
                 .margin(8)
                 .draw()?;
         }
-        area.present()?;
         Ok(())
     }
 }
@@ -256,20 +234,14 @@ fn steps(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
 pub fn loss_plot(losses: &[LossPoint], fits: &[FitPoint], stages: &[Stage]) -> Plot {
     let curve = |name: &str, value: fn(&LossPoint) -> Option<f64>| Series {
         name: name.to_owned(),
-        points: losses
-            .iter()
-            .filter_map(|p| Some([p.seconds, value(p)?]))
-            .collect(),
+        points: (losses.iter().filter_map(|p| Some([p.seconds, value(p)?]))).collect(),
         ..Series::default()
     };
     let mut start = 0.0;
-    let marks = stages
-        .iter()
-        .map(|stage| {
-            start += stage.seconds;
-            (start - stage.seconds, stage.name.clone())
-        })
-        .collect();
+    let mark = |stage: &Stage| {
+        start += stage.seconds;
+        (start - stage.seconds, stage.name.clone())
+    };
     let series = [
         curve("in the fit", |p| p.train),
         curve("held out", |p| p.held_out),
@@ -283,11 +255,8 @@ pub fn loss_plot(losses: &[LossPoint], fits: &[FitPoint], stages: &[Stage]) -> P
         title: "Loss".to_owned(),
         x: Axis::linear("seconds"),
         y: Axis::logarithmic("mean absolute difference, radiance; residual, relative"),
-        series: series
-            .into_iter()
-            .filter(|s| !s.points.is_empty())
-            .collect(),
-        marks,
+        series: (series.into_iter().filter(|s| !s.points.is_empty())).collect(),
+        marks: stages.iter().map(mark).collect(),
         labels: Vec::new(),
     }
 }
@@ -353,21 +322,13 @@ mod tests {
     #[test]
     fn hostile_values_are_left_out_and_an_empty_plot_is_still_a_picture() {
         draw(&Plot::default());
-        let odd = [
-            [0.0, -1.0],
-            [1.0, f64::NAN],
-            [2.0, f64::INFINITY],
-            [3.0, 0.0],
-            [f64::NAN, 1.0],
-        ];
-        for logarithmic in [false, true] {
-            let y = Axis {
-                label: String::new(),
-                logarithmic,
-            };
+        let ys = [-1.0, f64::NAN, f64::INFINITY, 0.0];
+        let mut odd: Vec<[f64; 2]> = (0..4).map(|i| [f64::from(i), ys[i as usize]]).collect();
+        odd.push([f64::NAN, 1.0]);
+        for y in [Axis::linear(""), Axis::logarithmic("")] {
             let series = Series {
                 name: "odd".into(),
-                points: odd.to_vec(),
+                points: odd.clone(),
                 band: vec![[f64::NAN, 1.0]; 5],
                 draw: Draw::Steps,
             };

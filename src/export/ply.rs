@@ -4,7 +4,7 @@ use crate::capture::mesh::Mesh;
 use crate::error::Result;
 use crate::export::atomic::write_atomically;
 use crate::export::part::Part;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use std::fmt::Display;
 use std::io::Write;
 use std::path::Path;
@@ -33,19 +33,14 @@ pub fn write_scene(path: &Path, parts: &[Part]) -> Result<()> {
         properties(out, "double", ["x", "y", "z"])?;
         properties(out, "uchar", COLORS)?;
         writeln!(out, "element face {faces}\n{CORNERS}\n{OBJECT_ID}")?;
-        properties(
-            out,
-            "float",
-            COLORS.map(|color| format!("emission_{color}")),
-        )?;
+        let emission = COLORS.map(|color| format!("emission_{color}"));
+        properties(out, "float", emission)?;
         writeln!(out, "end_header")?;
 
         for part in parts {
             for (vertex, position) in part.positions.iter().enumerate() {
                 let albedo = part.colors.get(vertex).unwrap_or(&part.estimate.albedo);
-                for v in position.to_array() {
-                    out.write_all(&v.to_le_bytes())?;
-                }
+                write_position(out, *position)?;
                 let linear8 = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
                 out.write_all(&albedo.to_array().map(linear8))?;
             }
@@ -119,9 +114,7 @@ pub fn write_mesh(path: &Path, mesh: &Mesh, with_objects: bool) -> Result<()> {
         }
         writeln!(out, "end_header")?;
         for (index, position) in mesh.positions.iter().enumerate() {
-            for v in position.to_array() {
-                out.write_all(&v.to_le_bytes())?;
-            }
+            write_position(out, *position)?;
             if colored {
                 write_color(out, mesh.vertex_colors[index])?;
             }
@@ -146,16 +139,15 @@ fn properties(out: &mut impl Write, kind: &str, names: [impl Display; 3]) -> std
     (names.into_iter()).try_for_each(|name| writeln!(out, "property {kind} {name}"))
 }
 
+fn write_position(out: &mut impl Write, position: DVec3) -> std::io::Result<()> {
+    out.write_all(position.to_array().map(f64::to_le_bytes).as_flattened())
+}
+
 fn write_color(out: &mut impl Write, color: Vec3) -> std::io::Result<()> {
-    color
-        .to_array()
-        .into_iter()
-        .try_for_each(|v| out.write_all(&v.to_le_bytes()))
+    out.write_all(color.to_array().map(f32::to_le_bytes).as_flattened())
 }
 
 fn write_face(out: &mut impl Write, corners: [u32; 3]) -> std::io::Result<()> {
     out.write_all(&[3])?;
-    corners
-        .into_iter()
-        .try_for_each(|i| out.write_all(&i.to_le_bytes()))
+    out.write_all(corners.map(u32::to_le_bytes).as_flattened())
 }

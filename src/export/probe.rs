@@ -24,11 +24,9 @@ const SAMPLES: u32 = 64;
 /// The file cannot be written or has another extension, or the point is not finite.
 pub fn write(path: &Path, world: &LitScene, at: DVec3) -> Result<()> {
     if !at.is_finite() {
-        return Err(Error::usage(
-            "--at",
-            "is no point",
-            "give x,y,z in the capture's coordinates",
-        ));
+        let problem = "is no point";
+        let remedy = "give x,y,z in the capture's coordinates";
+        return Err(Error::usage("--at", problem, remedy));
     }
     let point = (at - world.scene.origin).as_vec3();
     let picture = || panorama(world, point, HEIGHT, SAMPLES, 1);
@@ -37,20 +35,16 @@ pub fn write(path: &Path, world: &LitScene, at: DVec3) -> Result<()> {
         Some("hdr") => {
             let picture = picture();
             let (width, height) = (picture.width as usize, picture.height as usize);
-            let pixels: Vec<image::Rgb<f32>> = picture
-                .pixels
-                .iter()
-                .map(|c| image::Rgb(c.to_array()))
-                .collect();
+            let pixels = picture.pixels.iter().map(|c| image::Rgb(c.to_array()));
+            let pixels: Vec<image::Rgb<f32>> = pixels.collect();
             write_atomically(path, |out| {
                 Ok(image::codecs::hdr::HdrEncoder::new(out).encode(&pixels, width, height)?)
             })
         }
-        _ => Err(Error::file(
-            path,
-            "a panorama is written as .exr or .hdr",
-            "change the ending",
-        )),
+        _ => {
+            let problem = "a panorama is written as .exr or .hdr";
+            Err(Error::file(path, problem, "change the ending"))
+        }
     }
 }
 
@@ -70,15 +64,11 @@ pub fn panorama(world: &LitScene, point: Vec3, height: u32, samples: u32, seed: 
                 let [u, v] = stream.uniform2();
                 let theta = PI * (row as f32 + v) / height as f32;
                 let phi = 2.0 * PI * (column as f32 + u) / width as f32;
-                let direction = Vec3::new(
-                    theta.sin() * phi.cos(),
-                    theta.cos(),
-                    theta.sin() * phi.sin(),
-                );
+                let (sin, cos) = (theta.sin(), theta.cos());
+                let direction = Vec3::new(sin * phi.cos(), cos, sin * phi.sin());
                 let ray = Ray::new(point, direction);
-                sum += radiance(world, &ray, &mut stream, &options)
-                    .radiance
-                    .as_dvec3();
+                let sample = radiance(world, &ray, &mut stream, &options);
+                sum += sample.radiance.as_dvec3();
             }
             (sum / f64::from(samples.max(1))).as_vec3()
         })

@@ -14,11 +14,10 @@ pub struct Scale {
 impl Scale {
     /// A scale that holds all values with a margin, and is never empty. A logarithmic scale needs values > 0.
     pub fn around(values: impl Iterator<Item = f64>, logarithmic: bool) -> Self {
-        let (mut low, mut high) = values
-            .map(|v| if logarithmic { v.log10() } else { v })
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
-                (low.min(v), high.max(v))
-            });
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for position in values.map(|value| Self::position(value, logarithmic)) {
+            (low, high) = (low.min(position), high.max(position));
+        }
         if low > high {
             (low, high) = (0.0, 1.0);
         }
@@ -45,11 +44,14 @@ impl Scale {
     }
 
     fn value(&self, position: f64) -> f64 {
-        if self.logarithmic {
-            10f64.powf(position)
-        } else {
-            position
+        match self.logarithmic {
+            true => 10f64.powf(position),
+            false => position,
         }
+    }
+
+    fn position(value: f64, logarithmic: bool) -> f64 {
+        if logarithmic { value.log10() } else { value }
     }
 }
 
@@ -58,11 +60,7 @@ impl Ranged for Scale {
     type ValueType = f64;
 
     fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
-        let position = if self.logarithmic {
-            value.log10()
-        } else {
-            *value
-        };
+        let position = Self::position(*value, self.logarithmic);
         let fraction = ((position - self.low) / (self.high - self.low)).clamp(-1.0, 2.0);
         limit.0 + (fraction * f64::from(limit.1 - limit.0)).round() as i32
     }
@@ -78,30 +76,20 @@ impl Ranged for Scale {
             let digits: &[f64] = if span < 2.5 { &[1.0, 2.0, 5.0] } else { &[1.0] };
             let first = (self.low / step).floor() as i32;
             let last = (self.high / step).ceil() as i32;
-            return (first..=last)
-                .flat_map(|i| {
-                    digits
-                        .iter()
-                        .map(move |d| d * 10f64.powf(f64::from(i) * step))
-                })
-                .filter(|v| (self.low..=self.high).contains(&v.log10()))
-                .collect();
+            let decade = |i: i32| 10f64.powf(f64::from(i) * step);
+            let ticks = (first..=last).flat_map(|i| digits.iter().map(move |d| d * decade(i)));
+            return (ticks.filter(|v| (self.low..=self.high).contains(&v.log10()))).collect();
         }
 
         // Linear: the smallest step of 1, 2 or 5 × 10ⁿ that gives at most the wanted number of ticks.
         let (low, high) = (self.low(), self.high());
         let min_step = (high - low) / wanted;
         let power = 10f64.powf(min_step.log10().floor());
-        let step = [1.0, 2.0, 5.0, 10.0]
-            .into_iter()
-            .map(|m| m * power)
-            .find(|&step| step >= min_step)
-            .unwrap_or(min_step);
+        let mut steps = [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter();
+        let step = steps.find(|&step| step >= min_step).unwrap_or(min_step);
         let first = (low / step).ceil();
-        (0..=wanted as usize)
-            .map(|i| (first + i as f64) * step)
-            .filter(|v| (low..=high).contains(v))
-            .collect()
+        let ticks = (0..=wanted as usize).map(|i| (first + i as f64) * step);
+        ticks.filter(|v| (low..=high).contains(v)).collect()
     }
 
     fn range(&self) -> Range<f64> {
@@ -129,19 +117,14 @@ mod tests {
 
     #[test]
     fn ticks_are_round_and_inside() {
-        let linear = Scale::around([0.0, 0.93].into_iter(), false);
-        let labels: Vec<String> = linear
-            .key_points(BoldPoints(6))
-            .iter()
-            .map(Scale::format)
-            .collect();
-        assert_eq!(labels, ["0", "0.2", "0.4", "0.6", "0.8"]);
-        let decades = Scale::around([1e-7, 1e2].into_iter(), true);
-        let labels: Vec<String> = decades
-            .key_points(BoldPoints(10))
-            .iter()
-            .map(Scale::format)
-            .collect();
+        let labels = |ends: [f64; 2], logarithmic, count| -> Vec<String> {
+            let scale = Scale::around(ends.into_iter(), logarithmic);
+            let ticks = scale.key_points(BoldPoints(count));
+            ticks.iter().map(Scale::format).collect()
+        };
+        let linear = labels([0.0, 0.93], false, 6);
+        assert_eq!(linear, ["0", "0.2", "0.4", "0.6", "0.8"]);
+        let labels = labels([1e-7, 1e2], true, 10);
         assert!(labels.contains(&"1e-7".to_owned()) && labels.contains(&"100".to_owned()));
     }
 

@@ -1,14 +1,10 @@
 //! Strip plots as PNG: the values of named rows as dots, in two panels side by side.
 
-use crate::error::{Error, Result};
-use crate::export::canvas::{Canvas, FONT, register_fonts};
-use crate::export::picture::write_png_bytes;
+use crate::error::Result;
+use crate::export::canvas::{DrawError, FONT, PlotArea, write_plot};
 use crate::export::scale::Scale;
 use crate::math::stats::quantile;
-use plotters::prelude::{
-    BLACK, BitMapBackend, ChartBuilder, Circle, Color, DrawingArea, IntoDrawingArea, PathElement,
-    RGBColor, Text, WHITE,
-};
+use plotters::prelude::{BLACK, ChartBuilder, Circle, Color, PathElement, RGBColor, Text, WHITE};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{IntoFont, TextStyle};
 use std::path::Path;
@@ -56,39 +52,23 @@ impl Strips {
     /// # Errors
     /// The file cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
-        register_fonts();
         let height = FRAME + ROW * self.rows.len().max(1) as u32;
-        let mut canvas = Canvas::new(WIDTH, height, [255; 3]);
-        self.draw(&mut canvas.bytes, height)
-            .map_err(|error| Error::file(path, error, "nothing was written there"))?;
-        write_png_bytes(path, canvas.width, canvas.height, &canvas.bytes)
-    }
-
-    fn draw(
-        &self,
-        bytes: &mut [u8],
-        height: u32,
-    ) -> std::result::Result<(), Box<dyn std::error::Error + '_>> {
-        let area = BitMapBackend::with_buffer(bytes, (WIDTH, height)).into_drawing_area();
-        area.fill(&WHITE)?;
-        let area = area.titled(&self.title, (FONT, 22))?;
-        let (left, right) = area.split_horizontally((WIDTH as i32 + NAMES) / 2);
-        for (index, (area, panel)) in [left, right].iter().zip(&self.panels).enumerate() {
-            let names = if index == 0 { NAMES } else { 16 };
-            panel.draw(area, &self.rows, names)?;
-        }
-        area.present()?;
-        Ok(())
+        write_plot(path, (WIDTH, height), |area| {
+            let area = area.titled(&self.title, (FONT, 22))?;
+            let (left, right) = area.split_horizontally((WIDTH as i32 + NAMES) / 2);
+            self.panels[0].draw(&left, &self.rows, NAMES)?;
+            self.panels[1].draw(&right, &self.rows, 16)
+        })
     }
 }
 
 impl Panel {
     fn draw(
         &self,
-        area: &DrawingArea<BitMapBackend<'_>, plotters::coord::Shift>,
+        area: &PlotArea<'_>,
         rows: &[String],
         names: i32,
-    ) -> std::result::Result<(), Box<dyn std::error::Error>> {
+    ) -> std::result::Result<(), DrawError> {
         let shows = |v: &f64| v.is_finite() && (*v > 0.0 || !self.logarithmic);
         let all = self.values.iter().flatten().copied().chain(self.mark);
         let scale = Scale::around(all.filter(shows), self.logarithmic);
@@ -115,10 +95,8 @@ impl Panel {
         }
         for (row, values) in self.values.iter().enumerate() {
             let y = row as f64 + 0.5;
-            chart.draw_series([PathElement::new(
-                vec![(low, row as f64 + 1.0), (high, row as f64 + 1.0)],
-                GRID,
-            )])?;
+            let below = [low, high].map(|x| (x, row as f64 + 1.0));
+            chart.draw_series([PathElement::new(below, GRID)])?;
             let mut shown: Vec<f64> = values.iter().copied().filter(shows).collect();
             let dots = shown
                 .iter()

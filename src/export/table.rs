@@ -118,9 +118,7 @@ mod tests {
             None::<f64>.into(),
         ]);
         table.row(&["d".into(), 1e-17.into(), 8u64.into(), Some(2.5).into()]);
-        assert_eq!(
-            table.as_str(),
-            "name,x,n,held_out\n\"a \"\"b\"\", c\",0.1,7,\nd,1e-17,8,2.5\n"
-        );
+        let expected = "name,x,n,held_out\n\"a \"\"b\"\", c\",0.1,7,\nd,1e-17,8,2.5\n";
+        assert_eq!(table.as_str(), expected);
     }
 }

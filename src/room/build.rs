@@ -21,22 +21,18 @@ const CEILING_LAMP: Vec3 = Vec3::new(17.0, 16.0, 14.2);
 /// Radiance of the floor lamp, a warm paper lantern.
 const FLOOR_LAMP: Vec3 = Vec3::new(9.5, 5.2, 2.1);
 
-/// Material of an object; a texture still lacks its coordinates.
-enum ObjectMaterial {
-    Plain(Material),
-    Printed(Picture),
-}
-
 /// Collects objects with their materials.
 #[derive(Default)]
 struct Builder {
     modeller: Modeller,
-    materials: Vec<ObjectMaterial>,
+    materials: Vec<Material>,
+    /// The pictures of textured objects.
+    prints: Vec<(usize, Picture)>,
 }
 
 impl Builder {
     /// Adds an object built in room coordinates.
-    fn add(&mut self, name: &str, material: ObjectMaterial, shapes: impl FnOnce(&mut Modeller)) {
+    fn add(&mut self, name: &str, material: Material, shapes: impl FnOnce(&mut Modeller)) {
         self.modeller.object(name);
         self.materials.push(material);
         shapes(&mut self.modeller);
@@ -45,7 +41,27 @@ impl Builder {
     /// Adds an object of constant albedo.
     fn plain(&mut self, name: &str, albedo: [f32; 3], shapes: impl FnOnce(&mut Modeller)) {
         let material = Material::diffuse(albedo.into(), Vec3::ZERO);
-        self.add(name, ObjectMaterial::Plain(material), shapes);
+        self.add(name, material, shapes);
+    }
+
+    /// Adds an object with a picture for its albedo.
+    fn printed(&mut self, name: &str, picture: Picture, shapes: impl FnOnce(&mut Modeller)) {
+        self.prints.push((self.materials.len(), picture));
+        self.plain(name, [1.0; 3], shapes);
+    }
+}
+
+/// Textures objects with pictures, by the mesh's texture coordinates.
+pub fn print(materials: &mut [Material], mesh: &Mesh, prints: Vec<(usize, Picture)>) {
+    let corner_uvs = Arc::new(mesh.corner_uvs.clone());
+    for (object, picture) in prints {
+        let texture = Texture {
+            width: picture.width,
+            height: picture.height,
+            pixels: picture.pixels,
+            corner_uvs: corner_uvs.clone(),
+        };
+        materials[object].albedo = Albedo::Image(Arc::new(texture), Vec3::ONE);
     }
 }
 
@@ -65,29 +81,8 @@ pub fn build() -> (Mesh, Vec<Material>) {
     shelves(&mut b);
     decoration(&mut b);
 
-    let mesh = b.modeller.mesh;
-    let corner_uvs = Arc::new(mesh.corner_uvs.clone());
-    let materials = b
-        .materials
-        .into_iter()
-        .map(|material| match material {
-            ObjectMaterial::Plain(material) => material,
-            ObjectMaterial::Printed(picture) => Material {
-                albedo: Albedo::Image(
-                    Arc::new(Texture {
-                        width: picture.width,
-                        height: picture.height,
-                        pixels: picture.pixels,
-                        corner_uvs: corner_uvs.clone(),
-                    }),
-                    Vec3::ONE,
-                ),
-                emission: Vec3::ZERO,
-                lobe: None,
-            },
-        })
-        .collect();
-    (mesh, materials)
+    print(&mut b.materials, &b.modeller.mesh, b.prints);
+    (b.modeller.mesh, b.materials)
 }
 
 /// Floor, ceiling, walls, skirting and door.
@@ -117,13 +112,9 @@ fn shell(b: &mut Builder) {
     b.plain("skirting", [0.80, 0.79, 0.76], |m| {
         let (tall, thick) = (0.09, 0.014);
         for s in [-1.0, 1.0] {
-            let long = DVec3::new(x - thick, tall * 0.5, thick * 0.5);
-            m.rounded_box(
-                DVec3::new(0.0, tall * 0.5, s * (z - thick * 0.5)),
-                long,
-                0.0,
-                0,
-            );
+            let center = DVec3::new(0.0, tall * 0.5, s * (z - thick * 0.5));
+            let half = DVec3::new(x - thick, tall * 0.5, thick * 0.5);
+            m.rounded_box(center, half, 0.0, 0);
         }
         let low = DVec3::new(-x, 0.0, -z);
         m.cuboid(low, DVec3::new(-x + thick, tall, z));
@@ -138,8 +129,8 @@ fn shell(b: &mut Builder) {
 /// The ceiling lamp in its rim, and the floor lamp on its stand.
 fn lamps(b: &mut Builder) {
     let (width, depth) = (0.84, 0.46);
-    let lamp = |albedo, emission| ObjectMaterial::Plain(Material::diffuse(albedo, emission));
-    b.add("ceiling-lamp", lamp(Vec3::splat(0.70), CEILING_LAMP), |m| {
+    let panel = Material::diffuse(Vec3::splat(0.70), CEILING_LAMP);
+    b.add("ceiling-lamp", panel, |m| {
         let corner = DVec3::new(-width * 0.5, HEIGHT - 0.035, -depth * 0.5);
         m.grid(corner, DVec3::X * width, DVec3::Z * depth, 4, 2);
     });
@@ -151,8 +142,8 @@ fn lamps(b: &mut Builder) {
         });
     });
     let place = at(-1.72, 0.0, -1.52, 0.0);
-    let paper = Vec3::new(0.72, 0.66, 0.54);
-    b.add("floor-lamp", lamp(paper, FLOOR_LAMP), |m| {
+    let paper = Material::diffuse(Vec3::new(0.72, 0.66, 0.54), FLOOR_LAMP);
+    b.add("floor-lamp", paper, |m| {
         m.placed(place, |m| vessels::lantern(m, 1.42))
     });
     b.plain("floor-lamp-stand", [0.045, 0.045, 0.05], |m| {
@@ -194,7 +185,7 @@ fn seats(b: &mut Builder) {
 fn tables(b: &mut Builder) {
     let center = DVec3::new(0.02, 0.0, 0.22);
     let (length, width) = (2.5, 1.65);
-    b.add("rug", ObjectMaterial::Printed(texture::rug()), |m| {
+    b.printed("rug", texture::rug(), |m| {
         m.projection = Some(Projection {
             origin: center,
             u_axis: DVec3::X / length,
@@ -224,7 +215,7 @@ fn shelves(b: &mut Builder) {
     b.plain("bookcase", [0.16, 0.085, 0.045], |m| {
         m.placed(bookcase, |m| woodwork::bookcase(m, 0.98, 0.30));
     });
-    b.add("books", ObjectMaterial::Printed(texture::books()), |m| {
+    b.printed("books", texture::books(), |m| {
         m.placed(bookcase, |m| woodwork::books(m, 0.98, 0.30));
     });
     b.plain("sideboard", [0.78, 0.77, 0.74], |m| {
@@ -248,7 +239,7 @@ fn shelves(b: &mut Builder) {
 fn decoration(b: &mut Builder) {
     let (width, height) = (1.0, 0.70);
     let wall = at(0.05, 1.52, -HALF_DEPTH, 0.0);
-    b.add("poster", ObjectMaterial::Printed(texture::poster()), |m| {
+    b.printed("poster", texture::poster(), |m| {
         m.projection = Some(Projection {
             origin: wall.translation,
             u_axis: DVec3::X / width,
@@ -265,14 +256,14 @@ fn decoration(b: &mut Builder) {
             woodwork::rim(m, width + 0.05, height + 0.05, 0.026, 0.025)
         });
     });
-    b.plain("canvas-blue", [0.06, 0.13, 0.34], |m| {
+    for (name, albedo, x) in [
+        ("canvas-blue", [0.06, 0.13, 0.34], 0.05),
+        ("canvas-ochre", [0.58, 0.34, 0.07], 0.67),
+    ] {
+        let center = DVec3::new(x, 1.45, HALF_DEPTH - 0.018);
         let half = DVec3::new(0.24, 0.32, 0.018);
-        m.rounded_box(DVec3::new(0.05, 1.45, HALF_DEPTH - 0.018), half, 0.008, 1);
-    });
-    b.plain("canvas-ochre", [0.58, 0.34, 0.07], |m| {
-        let half = DVec3::new(0.24, 0.32, 0.018);
-        m.rounded_box(DVec3::new(0.67, 1.45, HALF_DEPTH - 0.018), half, 0.008, 1);
-    });
+        b.plain(name, albedo, |m| m.rounded_box(center, half, 0.008, 1));
+    }
     let corner = at(-2.02, 0.0, 1.45, 0.0);
     b.plain("pot", [0.50, 0.47, 0.43], |m| {
         m.placed(corner, |m| vessels::pot(m, 0.21, 0.36))

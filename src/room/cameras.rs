@@ -71,7 +71,6 @@ pub fn cameras(views: &[View], size: [u32; 2]) -> Vec<(Intrinsics, Pose)> {
         let middle = size.map(|side| f64::from(side) * 0.5);
         Intrinsics::plain(size, [middle[0] / half_field; 2], middle)
     };
-    (views.iter())
-        .map(|view| (lens(view.half_field), view.pose))
-        .collect()
+    let camera = |view: &View| (lens(view.half_field), view.pose);
+    views.iter().map(camera).collect()
 }

@@ -25,5 +25,5 @@ use crate::error::Result;
 /// # Errors
 /// The program file is damaged.
 pub fn capture() -> Result<Capture> {
-    Room::new().with_stored_photographs()
+    Ok(Room::new().capture_of(photographs::stored()?, photographs::STORED.size))
 }

@@ -43,22 +43,19 @@ impl Room {
     pub fn capture(&self, photographs: Vec<PhotographSource>, size: [u32; 2]) -> Capture {
         let cameras = cameras::cameras(&self.views, size);
         let up: DVec3 = cameras.iter().map(|(_, pose)| pose.rotation.y_axis).sum();
+        let frame = |((intrinsics, pose), photograph)| Frame {
+            intrinsics,
+            pose,
+            exposure: None,
+            photograph,
+            depth: None,
+        };
         Capture {
             name: self.name.clone(),
             folder: None,
             segmentation: None,
             mesh: self.mesh.clone(),
-            frames: cameras
-                .into_iter()
-                .zip(photographs)
-                .map(|((intrinsics, pose), photograph)| Frame {
-                    intrinsics,
-                    pose,
-                    exposure: None,
-                    photograph,
-                    depth: None,
-                })
-                .collect(),
+            frames: cameras.into_iter().zip(photographs).map(frame).collect(),
             up: up.normalize_or_zero(),
             warnings: Vec::new(),
         }
@@ -86,11 +83,8 @@ impl Room {
 
     /// The room as a capture with photographs in memory, one a view, all of one size.
     pub fn capture_of(&self, photographs: Vec<Photograph>, size: [u32; 2]) -> Capture {
-        let sources = photographs
-            .into_iter()
-            .map(|photograph| PhotographSource::Memory(Arc::new(photograph)))
-            .collect();
-        self.capture(sources, size)
+        let sources = photographs.into_iter().map(Arc::new);
+        self.capture(sources.map(PhotographSource::Memory).collect(), size)
     }
 }
 

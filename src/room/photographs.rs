@@ -52,14 +52,6 @@ pub struct Rendering {
 }
 
 impl Room {
-    /// The room with the photographs stored in the program.
-    ///
-    /// # Errors
-    /// The program file is damaged.
-    pub fn with_stored_photographs(&self) -> Result<Capture> {
-        Ok(self.capture_of(stored()?, STORED.size))
-    }
-
     /// The room with newly rendered photographs.
     ///
     /// # Errors
@@ -97,11 +89,8 @@ pub fn stored() -> Result<Vec<Photograph>> {
     let decode = |(index, bytes): (usize, &&[u8])| {
         let image = image::load_from_memory_with_format(bytes, ImageFormat::OpenExr)
             .map_err(|error| {
-                Error::new(
-                    format!("built-in photograph {index}"),
-                    error,
-                    "reinstall relit",
-                )
+                let remedy = "reinstall relit";
+                Error::new(format!("built-in photograph {index}"), error, remedy)
             })?
             .into_rgb32f();
         let pixels = image.pixels().map(|p| Vec3::from(p.0)).collect();

@@ -82,10 +82,8 @@ impl Modeller {
 
     /// Joins rows of equally many points by quads; their front is on the side of (along the row) × (to the next row).
     pub fn surface(&mut self, rows: &[Vec<DVec3>], closed: bool) {
-        let rows: Vec<Vec<u32>> = rows
-            .iter()
-            .map(|row| row.iter().map(|&p| self.vertex(p)).collect())
-            .collect();
+        let mut row_of = |row: &Vec<DVec3>| row.iter().map(|&p| self.vertex(p)).collect();
+        let rows: Vec<Vec<u32>> = rows.iter().map(&mut row_of).collect();
         for (low, high) in rows.iter().zip(rows.iter().skip(1)) {
             let count = low.len();
             for i in 0..if closed { count } else { count - 1 } {
@@ -117,24 +115,18 @@ impl Modeller {
         for axis in 0..3 {
             let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
             for sign in [1.0, -1.0] {
-                let rows: Vec<Vec<DVec3>> = ticks(inner[b])
-                    .into_iter()
-                    .map(|y| {
-                        ticks(inner[a])
-                            .into_iter()
-                            .map(|x| {
-                                let mut p = DVec3::ZERO;
-                                p[axis] = sign * half[axis];
-                                p[a] = sign * x;
-                                p[b] = y;
-                                let core = p.clamp(-inner, inner);
-                                let round = core + (p - core).normalize_or_zero() * radius;
-                                center + if radius > 0.0 { round } else { p }
-                            })
-                            .collect()
-                    })
-                    .collect();
-                self.surface(&rows, false);
+                let point = |x: f64, y: f64| {
+                    let mut p = DVec3::ZERO;
+                    p[axis] = sign * half[axis];
+                    p[a] = sign * x;
+                    p[b] = y;
+                    let core = p.clamp(-inner, inner);
+                    let round = core + (p - core).normalize_or_zero() * radius;
+                    center + if radius > 0.0 { round } else { p }
+                };
+                let (columns, rows) = (ticks(inner[a]), ticks(inner[b]));
+                let row = |&y: &f64| columns.iter().map(|&x| point(x, y)).collect();
+                self.surface(&rows.iter().map(row).collect::<Vec<_>>(), false);
             }
         }
     }
@@ -156,11 +148,9 @@ impl Modeller {
 
     /// A solid of revolution about the local y axis; `profile` has (radius, height) points from bottom to top.
     pub fn lathe(&mut self, profile: &[[f64; 2]], sides: u32) {
-        let rings: Vec<Vec<DVec3>> = profile
-            .iter()
-            .map(|&[r, y]| ring(DVec3::new(0.0, y, 0.0), DVec3::X * r, -DVec3::Z * r, sides))
-            .collect();
-        self.loft(&rings);
+        let at =
+            |&[r, y]: &[f64; 2]| ring(DVec3::ZERO.with_y(y), DVec3::X * r, -DVec3::Z * r, sides);
+        self.loft(&profile.iter().map(at).collect::<Vec<_>>());
     }
 
     /// A straight round bar with a radius at each end.
@@ -191,37 +181,24 @@ mod tests {
     fn volume(modeller: &Modeller) -> f64 {
         let mesh = &modeller.mesh;
         let corner = |i: u32| mesh.positions[i as usize];
-        mesh.triangles
-            .iter()
-            .map(|&[a, b, c]| corner(a).dot(corner(b).cross(corner(c))) / 6.0)
-            .sum()
+        let part = |&[a, b, c]: &[u32; 3]| corner(a).dot(corner(b).cross(corner(c))) / 6.0;
+        mesh.triangles.iter().map(part).sum()
     }
 
     #[test]
     fn shapes_enclose_their_volumes_wherever_they_stand() {
         type Shape<'a> = &'a dyn Fn(&mut Modeller);
-        let shapes: [(Shape, f64, f64); 4] = [
-            (
-                &|m| m.cuboid(DVec3::ZERO, DVec3::new(1.0, 2.0, 3.0)),
-                6.0,
-                1e-12,
-            ),
-            // A box of radius r: core + slabs + quarter cylinders + a sphere, less than 3 % lost to the facets.
-            (
-                &|m| m.rounded_box(DVec3::ONE, DVec3::splat(0.5), 0.1, 4),
-                0.512 + 6.0 * 0.064 + 12.0 * 0.8 * 0.007_854 + 0.004_189,
-                0.003,
-            ),
-            (
-                &|m| m.lathe(&[[0.0, -1.0], [1.0, -1.0], [1.0, 1.0]], 64),
-                TAU,
-                0.02,
-            ),
-            (
-                &|m| m.bar(DVec3::ONE, DVec3::new(2.0, 0.0, 3.0), [0.1, 0.1], 48),
-                6f64.sqrt() * 0.01 * TAU * 0.5,
-                0.001,
-            ),
+        let cuboid: Shape = &|m| m.cuboid(DVec3::ZERO, DVec3::new(1.0, 2.0, 3.0));
+        let rounded: Shape = &|m| m.rounded_box(DVec3::ONE, DVec3::splat(0.5), 0.1, 4);
+        let cylinder: Shape = &|m| m.lathe(&[[0.0, -1.0], [1.0, -1.0], [1.0, 1.0]], 64);
+        let bar: Shape = &|m| m.bar(DVec3::ONE, DVec3::new(2.0, 0.0, 3.0), [0.1, 0.1], 48);
+        // A box of radius r: core + slabs + quarter cylinders + a sphere, less than 3 % lost to the facets.
+        let of_rounded = 0.512 + 6.0 * 0.064 + 12.0 * 0.8 * 0.007_854 + 0.004_189;
+        let shapes = [
+            (cuboid, 6.0, 1e-12),
+            (rounded, of_rounded, 0.003),
+            (cylinder, TAU, 0.02),
+            (bar, 6f64.sqrt() * 0.01 * TAU * 0.5, 0.001),
         ];
         for (shape, expected, tolerance) in shapes {
             let mut modeller = Modeller::default();

@@ -4,6 +4,7 @@ use crate::math::frame::Frame;
 use crate::math::picture::Picture;
 use crate::math::rng::Stream;
 use crate::math::warp::{cosine_hemisphere, uniform_triangle};
+use crate::scene::Object;
 use crate::scene::camera::Camera;
 use crate::scene::geometry::{Hit, Ray, offset_origin};
 use crate::transport::lit::LitScene;
@@ -83,34 +84,29 @@ impl From<BTreeMap<String, ObjectTruth>> for crate::capture::truth::Truth {
 pub fn objects(world: &LitScene) -> BTreeMap<String, ObjectTruth> {
     let scene = &world.scene;
     let seen = seen_pixels(world);
-    (0..scene.objects.len())
-        .map(|index| {
-            let object = &scene.objects[index];
-            let material = &world.materials[index];
-            let textured = !matches!(material.albedo, Albedo::Constant(_));
-            let albedo = match material.albedo {
-                Albedo::Constant(color) => color,
-                _ => mean_over_area(world, index, |hit, _| material.albedo_at(hit)),
-            };
-            let emits = material.emission != Vec3::ZERO;
-            let reflected = || {
-                let arriving =
-                    |hit: &Hit, stream: &mut Stream| arriving_radiance(world, hit, stream);
-                albedo * mean_over_area(world, index, arriving)
-            };
-            let truth = ObjectTruth {
-                albedo: albedo.to_array(),
-                emission: material.emission.to_array(),
-                exitance: emits.then(|| (material.emission + reflected()).to_array()),
-                roughness: material.lobe.map(|lobe| lobe.roughness),
-                textured,
-                triangles: object.triangles.len(),
-                pixels: seen[index],
-                area: object.area,
-            };
-            (object.name.clone(), truth)
-        })
-        .collect()
+    let truth = |(index, object): (usize, &Object)| {
+        let material = &world.materials[index];
+        let textured = !matches!(material.albedo, Albedo::Constant(_));
+        let albedo = match material.albedo {
+            Albedo::Constant(color) => color,
+            _ => mean_over_area(world, index, |hit, _| material.albedo_at(hit)),
+        };
+        let emits = material.emission != Vec3::ZERO;
+        let arriving = |hit: &Hit, stream: &mut Stream| arriving_radiance(world, hit, stream);
+        let reflected = || albedo * mean_over_area(world, index, arriving);
+        let truth = ObjectTruth {
+            albedo: albedo.to_array(),
+            emission: material.emission.to_array(),
+            exitance: emits.then(|| (material.emission + reflected()).to_array()),
+            roughness: material.lobe.map(|lobe| lobe.roughness),
+            textured,
+            triangles: object.triangles.len(),
+            pixels: seen[index],
+            area: object.area,
+        };
+        (object.name.clone(), truth)
+    };
+    scene.objects.iter().enumerate().map(truth).collect()
 }
 
 /// Number of pixels of all cameras whose centre sees each object.
@@ -137,9 +133,8 @@ pub fn albedo_picture(world: &LitScene, camera: &Camera) -> Picture {
     Picture::from_fn(width, height, |x, y| {
         let points = (0..SIDE * SIDE).map(|i| {
             let offset = Vec2::new((i % SIDE) as f32 + 0.5, (i / SIDE) as f32 + 0.5);
-            let hit = world
-                .scene
-                .intersect(&camera.ray(Vec2::new(x as f32, y as f32) + offset / SIDE as f32));
+            let ray = camera.ray(Vec2::new(x as f32, y as f32) + offset / SIDE as f32);
+            let hit = world.scene.intersect(&ray);
             hit.map_or(Vec3::ZERO, |hit| world.surface(&hit).albedo)
         });
         points.sum::<Vec3>() / (SIDE * SIDE) as f32
@@ -154,36 +149,27 @@ fn mean_over_area(
 ) -> Vec3 {
     let scene = &world.scene;
     let triangles = &scene.objects[object].triangles;
-    let cumulative_areas: Vec<f64> = triangles
-        .iter()
-        .scan(0.0, |sum, &t| {
-            *sum += f64::from(scene.areas[t as usize]);
-            Some(*sum)
-        })
-        .collect();
-    let total = cumulative_areas.last().copied().unwrap_or(0.0);
-    let values: Vec<Vec3> = (0..SAMPLES)
-        .into_par_iter()
-        .map(|index| {
-            let mut stream = Stream::new(0, object as u64, 0, index);
-            // Strata of equal area.
-            let area = (index as f64 + stream.uniform_f64()) / SAMPLES as f64 * total;
-            let chosen = cumulative_areas
-                .partition_point(|&sum| sum <= area)
-                .min(triangles.len() - 1);
-            let [b1, b2] = uniform_triangle(stream.uniform2());
-            let triangle = triangles[chosen];
-            quantity(
-                &Hit {
-                    t: 0.0,
-                    triangle,
-                    b1,
-                    b2,
-                },
-                &mut stream,
-            )
-        })
-        .collect();
+    let mut total = 0.0;
+    let mut up_to = |&triangle: &u32| {
+        total += f64::from(scene.areas[triangle as usize]);
+        total
+    };
+    let cumulative_areas: Vec<f64> = triangles.iter().map(&mut up_to).collect();
+    let sample = |index: u64| {
+        let mut stream = Stream::new(0, object as u64, 0, index);
+        // Strata of equal area.
+        let area = (index as f64 + stream.uniform_f64()) / SAMPLES as f64 * total;
+        let chosen = cumulative_areas.partition_point(|&sum| sum <= area);
+        let [b1, b2] = uniform_triangle(stream.uniform2());
+        let hit = Hit {
+            t: 0.0,
+            triangle: triangles[chosen.min(triangles.len() - 1)],
+            b1,
+            b2,
+        };
+        quantity(&hit, &mut stream)
+    };
+    let values: Vec<Vec3> = (0..SAMPLES).into_par_iter().map(sample).collect();
     let sum: DVec3 = values.iter().map(|v| v.as_dvec3()).sum();
     (sum / SAMPLES as f64).as_vec3()
 }
@@ -194,11 +180,6 @@ fn arriving_radiance(world: &LitScene, hit: &Hit, stream: &mut Stream) -> Vec3 {
     let direction = Frame::around(normal).to_world(cosine_hemisphere(stream.uniform2()));
     let corners = world.scene.corners(hit.triangle);
     let origin = offset_origin(world.scene.point(hit), normal, &corners, direction);
-    radiance(
-        world,
-        &Ray::new(origin, direction),
-        stream,
-        &PathOptions::default(),
-    )
-    .radiance
+    let ray = Ray::new(origin, direction);
+    radiance(world, &ray, stream, &PathOptions::default()).radiance
 }

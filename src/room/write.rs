@@ -8,6 +8,7 @@ use crate::room::cameras;
 use crate::room::model::Room;
 use crate::room::photographs::{self, Rendering, STORED};
 use crate::room::truth::{self, Truth};
+use crate::scene::camera::Camera;
 use std::path::Path;
 
 /// Writes the room into a new or empty folder, atomically: transforms.json, mesh.obj, images, truth.json and
@@ -30,9 +31,8 @@ pub fn write(out: &Path, rendering: Option<&Rendering>) -> Result<()> {
     capture::write_mesh(out, &room.mesh)?;
 
     let world = room.lit(rendering_used.size)?;
-    let albedo: Vec<Picture> = (world.scene.cameras.iter())
-        .map(|camera| truth::albedo_picture(&world, camera))
-        .collect();
+    let seen_by = |camera: &Camera| truth::albedo_picture(&world, camera);
+    let albedo: Vec<Picture> = world.scene.cameras.iter().map(seen_by).collect();
     let truth = Truth {
         name: "room",
         renderer: format!("relit {}", env!("CARGO_PKG_VERSION")),

@@ -35,13 +35,13 @@ impl Source {
     /// Default folder of results: `relit-out/<capture>`.
     pub fn default_out(&self) -> PathBuf {
         let name = match self {
-            Self::BuiltInRoom => "built-in-room".into(),
-            Self::Folder(folder) => std::path::absolute(folder)
-                .ok()
-                .and_then(|path| Some(named(&path)?.to_owned()))
-                .unwrap_or_else(|| "capture".into()),
+            Self::BuiltInRoom => Some("built-in-room".into()),
+            Self::Folder(folder) => {
+                let folder = std::path::absolute(folder).ok();
+                folder.and_then(|folder| Some(named(&folder)?.to_owned()))
+            }
         };
-        Path::new("relit-out").join(name)
+        Path::new("relit-out").join(name.unwrap_or_else(|| "capture".into()))
     }
 }
 

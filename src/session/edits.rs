@@ -107,13 +107,12 @@ impl Edits {
 
     /// The edits for other object indices: `places` maps old to new ones. Drops those of removed objects.
     pub fn moved(&self, places: &[Option<u32>]) -> Self {
-        let objects = self.objects.iter();
+        let moved = |(&object, edit): (&usize, &ObjectEdit)| {
+            let place = (*places.get(object)?)?;
+            Some((place as usize, *edit))
+        };
         Self {
-            objects: objects
-                .filter_map(|(&object, edit)| {
-                    Some((*places.get(object)?.as_ref()? as usize, *edit))
-                })
-                .collect(),
+            objects: self.objects.iter().filter_map(moved).collect(),
             outside: self.outside,
         }
     }
@@ -158,12 +157,10 @@ impl Edits {
         }
         if let (Some(factor), Some(outside)) = (self.outside, &mut edited.outside) {
             let factor = factor.max(Vec3::ZERO);
-            let pixels = outside
-                .pixels
-                .iter_mut()
-                .chain(outside.above.iter_mut().flatten());
+            let above = outside.above.iter_mut().flatten();
             let sun = outside.sun.iter_mut().map(|sun| &mut sun.irradiance);
-            pixels.chain(sun).for_each(|p| *p *= factor);
+            let all = outside.pixels.iter_mut().chain(above).chain(sun);
+            all.for_each(|p| *p *= factor);
         }
         edited
     }
@@ -215,11 +212,9 @@ impl EditsRecord {
         let objects = self.objects.0.iter().map(|(name, edit)| {
             let object = scene.objects.iter().position(|o| o.name == *name);
             let object = object.ok_or_else(|| {
-                Error::new(
-                    format!("{}: edits.objects.{name}", path.display()),
-                    "the capture has no object of this name",
-                    "name the capture it was made from",
-                )
+                let place = format!("{}: edits.objects.{name}", path.display());
+                let problem = "the capture has no object of this name";
+                Error::new(place, problem, "name the capture it was made from")
             });
             Ok((object?, *edit))
         });
@@ -300,10 +295,8 @@ mod tests {
         edits.set(1, dim);
         edits.set_outside(Vec3::new(0.0, 0.5, 1.0));
         let changed = edited.of(&found, &edits);
-        assert_eq!(
-            (changed.objects[0].albedo, changed.objects[0].emission),
-            (red, Vec3::ZERO)
-        );
+        let painted = &changed.objects[0];
+        assert_eq!((painted.albedo, painted.emission), (red, Vec3::ZERO));
         assert_eq!(changed.objects[1].emission, Vec3::splat(3.0));
         let outside = changed.outside.as_ref().expect("outside");
         assert_eq!(outside.pixels, [Vec3::new(0.0, 1.0, 2.0)]);

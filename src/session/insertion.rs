@@ -99,7 +99,7 @@ struct Placed {
 impl Placed {
     /// `shown` unless another picture stays until this one has samples.
     fn new(inserted: Inserted, seed: u64, shown: bool) -> Self {
-        let first_look = match shown && !inserted.composite.objects().is_empty() {
+        let first_look = match shown && !inserted.composite.objects.is_empty() {
             true => first_look(&inserted.composite),
             false => Vec::new(),
         };
@@ -177,11 +177,6 @@ impl Inserting {
     pub fn place(&mut self, placements: Vec<Placement>) {
         self.placements = placements;
         self.update();
-    }
-
-    /// The shown frame.
-    pub fn frame(&self) -> usize {
-        self.frame
     }
 
     /// The inserted objects.
@@ -272,7 +267,7 @@ impl Inserting {
     fn samples(&self) -> Option<u32> {
         let relit = self.relit.as_ref().map(|relit| relit.relighting.samples());
         let placed = (self.placed.as_ref())
-            .filter(|placed| !placed.inserted.composite.objects().is_empty())
+            .filter(|placed| !placed.inserted.composite.objects.is_empty())
             .map(Placed::samples);
         relit.into_iter().chain(placed).min()
     }

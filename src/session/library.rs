@@ -118,17 +118,17 @@ impl Library {
         let lit = Arc::new(estimate.lit(&capture.scene));
         let photographed = match objects.is_empty() {
             true => Harmonics::default(),
-            false => *self
-                .photographed
-                .get_or_insert_with(|| light_of_photographs(capture)),
+            false => {
+                let known = &mut self.photographed;
+                *known.get_or_insert_with(|| light_of_photographs(capture))
+            }
         };
         let photographed = vec![photographed; objects.len()];
         let as_taken = Exposure::default();
         let naive = Pasted::new(&backdrop, &lit, &objects, &photographed, as_taken);
-        let estimated: Vec<Harmonics> = objects
-            .iter()
-            .map(|object| harmonics_of_estimate(&lit, object.center, options, seed))
-            .collect();
+        let at =
+            |object: &Arc<PlacedObject>| harmonics_of_estimate(&lit, object.center, options, seed);
+        let estimated: Vec<Harmonics> = objects.iter().map(at).collect();
         let naive_estimate = Pasted::new(&backdrop, &lit, &objects, &estimated, backdrop.exposure);
         Inserted {
             composite: Composite::new(backdrop, lit, objects, *options, seed),

@@ -3,12 +3,10 @@
 
 pub mod command;
 pub mod edits;
-mod full;
 pub mod inbox;
 pub mod insertion;
 pub mod library;
 pub mod light;
-mod metric;
 pub mod open;
 pub mod open_capture;
 pub mod painter;

@@ -41,18 +41,15 @@ impl PathKind {
             false => "there is nothing",
             true => "is no capture",
         };
-        Err(Error::file(
-            path,
-            found,
-            "name a folder: a capture's, which holds transforms.json, a scan's, or one of results",
-        ))
+        let remedy =
+            "name a folder: a capture's, which holds transforms.json, a scan's, or one of results";
+        Err(Error::file(path, found, remedy))
     }
 
     /// The folder that a scan is imported into: `capture` in the folder of its results.
     pub fn imported(scan: &Path) -> PathBuf {
-        Source::Folder(scan.to_owned())
-            .default_out()
-            .join("capture")
+        let source = Source::Folder(scan.to_owned());
+        source.default_out().join("capture")
     }
 }
 
@@ -76,10 +73,8 @@ mod tests {
         let scan = folder("scan", "frame-000000.color.png");
         let at = |path: &Path| PathKind::at(path).expect("something is there");
         assert_eq!(at(&capture), PathKind::Capture(capture.clone()));
-        assert_eq!(
-            at(&capture.join("transforms.json")),
-            PathKind::Capture(capture)
-        );
+        let cameras = capture.join("transforms.json");
+        assert_eq!(at(&cameras), PathKind::Capture(capture));
         assert_eq!(at(&results), PathKind::Results(results.clone()));
         assert_eq!(at(&killed), PathKind::Results(killed));
         assert_eq!(at(&scan), PathKind::Scan(scan));

@@ -76,7 +76,7 @@ fn insertion() -> (Insertion, Vec<Arc<PlacedObject>>) {
 
 fn tracer(card: &Card, insertion: &Insertion, objects: &[Arc<PlacedObject>]) -> Tracer {
     let inserted: Vec<Inserted<'_>> = objects.iter().map(|o| o.for_card()).collect();
-    Tracer::new(card, insertion.lit(), &inserted).expect("the scene fits")
+    Tracer::new(card, &insertion.lit, &inserted).expect("the scene fits")
 }
 
 fn alike(a: &[Vec3], b: &[Vec3]) -> f64 {

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::math::color::srgb_to_linear;
 use crate::math::picture::Picture;
 use glam::Vec3;
-use image::{DynamicImage, ImageReader, Limits};
+use image::{DynamicImage, ImageReader, Limits, Rgb};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
@@ -24,11 +24,8 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
         return Err(Error::file(path, "is no regular file", "name a file"));
     }
     if metadata.len() > MAX_BYTES {
-        return Err(Error::file(
-            path,
-            "is larger than 1 GiB",
-            "reduce the object",
-        ));
+        let problem = "is larger than 1 GiB";
+        return Err(Error::file(path, problem, "reduce the object"));
     }
     inputs::note(path);
     std::fs::read(path).map_err(|e| Error::io(path, &e))
@@ -39,21 +36,16 @@ pub fn resolve(referrer: &Path, name: &str) -> Result<PathBuf> {
     let folder = folder_of(referrer);
     let folder = folder.canonicalize().map_err(|e| Error::io(folder, &e))?;
     let missing = |_| {
-        Error::file(
-            referrer,
-            format!("refers to `{name}`, which cannot be opened"),
-            "put that file beside it",
-        )
+        let problem = format!("refers to `{name}`, which cannot be opened");
+        Error::file(referrer, problem, "put that file beside it")
     };
     // Some exporters on Windows write backslashes.
     let wanted = folder.join(name.replace('\\', "/"));
     let found = wanted.canonicalize().map_err(missing)?;
     if !found.starts_with(&folder) {
-        return Err(Error::file(
-            referrer,
-            format!("refers to `{name}`, outside its own folder"),
-            "put that file beside it and name it without a folder",
-        ));
+        let problem = format!("refers to `{name}`, outside its own folder");
+        let remedy = "put that file beside it and name it without a folder";
+        return Err(Error::file(referrer, problem, remedy));
     }
     Ok(found)
 }
@@ -70,11 +62,9 @@ pub enum TextureKind {
 /// Decodes an image to linear values. `place` names it in errors.
 pub fn decode(bytes: &[u8], meaning: TextureKind, place: &str) -> Result<Picture> {
     let broken = |e: &dyn std::fmt::Display| {
-        Error::new(
-            place,
-            format!("the texture cannot be read: {e}"),
-            "save it as PNG or JPEG of at most 16384 pixels a side",
-        )
+        let problem = format!("the texture cannot be read: {e}");
+        let remedy = "save it as PNG or JPEG of at most 16384 pixels a side";
+        Error::new(place, problem, remedy)
     };
     let mut reader = ImageReader::new(Cursor::new(bytes))
         .with_guessed_format()
@@ -84,19 +74,18 @@ pub fn decode(bytes: &[u8], meaning: TextureKind, place: &str) -> Result<Picture
     limits.max_image_height = Some(MAX_SIDE);
     reader.limits(limits);
     let image = reader.decode().map_err(|e| broken(&e))?;
-    let linear = meaning == TextureKind::Data
-        || matches!(
-            image,
-            DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_)
-        );
+    use DynamicImage::{ImageRgb32F, ImageRgba32F};
+    let is_float = matches!(image, ImageRgb32F(_) | ImageRgba32F(_));
+    let linear = is_float || meaning == TextureKind::Data;
     let colors = image.to_rgb32f();
+    let color = |p: &Rgb<f32>| match linear {
+        true => Vec3::from(p.0),
+        false => Vec3::from(p.0.map(srgb_to_linear)),
+    };
     let mut picture = Picture {
         width: colors.width(),
         height: colors.height(),
-        pixels: colors
-            .pixels()
-            .map(|p| Vec3::from(if linear { p.0 } else { p.0.map(srgb_to_linear) }))
-            .collect(),
+        pixels: colors.pixels().map(color).collect(),
     };
     if !picture.pixels.iter().all(|c| c.is_finite()) {
         return Err(broken(&"it holds values that are not finite"));

@@ -20,11 +20,8 @@ use std::sync::Arc;
 /// Reads a glTF file with its buffers and images.
 pub(super) fn read(path: &Path) -> Result<Parts> {
     let broken = |problem: String| {
-        Error::file(
-            path,
-            problem,
-            "export it again as glTF 2.0 without compression",
-        )
+        let remedy = "export it again as glTF 2.0 without compression";
+        Error::file(path, problem, remedy)
     };
     let gltf = gltf_file::parse(path, &files::read_bytes(path)?)?;
     let file = |_: &str, name: &str| files::read_bytes(&files::resolve(path, name)?);
@@ -42,13 +39,8 @@ pub(super) fn read(path: &Path) -> Result<Parts> {
     }
     let mut images = HashMap::new();
     for material in gltf.materials() {
-        let surface = surface(
-            &material,
-            (path, &file),
-            &buffers,
-            &mut images,
-            &mut parts.warnings,
-        )?;
+        let (file, warnings) = ((path, &file as ReadFile<'_>), &mut parts.warnings);
+        let surface = surface(&material, file, &buffers, &mut images, warnings)?;
         parts.surfaces.push(surface);
     }
     // glTF's default material, for primitives without one: white, fully metallic, roughness 1.
@@ -89,27 +81,21 @@ fn push_primitive(
     };
 
     // Positions are required, other attributes optional.
-    let positions: Vec<DVec3> = (numbers(&accessor, buffers, &[Dimensions::Vec3])?.0)
-        .chunks_exact(3)
-        .map(|p| transform.transform_point3(DVec3::from_slice(p)))
-        .collect();
+    let place = |p: &[f64]| transform.transform_point3(DVec3::from_slice(p));
+    let (values, _) = numbers(&accessor, buffers, &[Dimensions::Vec3])?;
+    let positions: Vec<DVec3> = values.chunks_exact(3).map(place).collect();
     let linear = DMat3::from_mat4(transform);
     let mirrored = linear.determinant() < 0.0;
     let normal_transform = linear.inverse().transpose();
-    let normals: Vec<Vec3> = (attribute(&Semantic::Normals, &[Dimensions::Vec3])?.0)
-        .chunks_exact(3)
-        .map(|n| (normal_transform * DVec3::from_slice(n)).normalize_or_zero())
-        .map(|n| n.as_vec3())
-        .collect();
+    let turn = |n: &[f64]| (normal_transform * DVec3::from_slice(n)).normalize_or_zero();
+    let (values, _) = attribute(&Semantic::Normals, &[Dimensions::Vec3])?;
+    let normals: Vec<Vec3> = values.chunks_exact(3).map(|n| turn(n).as_vec3()).collect();
     let material = primitive.material();
-    let uv_set = material
-        .pbr_metallic_roughness()
-        .base_color_texture()
-        .map_or(0, |info| info.tex_coord());
-    let uvs: Vec<Vec2> = (attribute(&Semantic::TexCoords(uv_set), &[Dimensions::Vec2])?.0)
-        .chunks_exact(2)
-        .map(|uv| Vec2::new(uv[0] as f32, 1.0 - uv[1] as f32))
-        .collect();
+    let texture = material.pbr_metallic_roughness().base_color_texture();
+    let uv_set = texture.map_or(0, |info| info.tex_coord());
+    let uv = |uv: &[f64]| Vec2::new(uv[0] as f32, 1.0 - uv[1] as f32);
+    let (values, _) = attribute(&Semantic::TexCoords(uv_set), &[Dimensions::Vec2])?;
+    let uvs: Vec<Vec2> = values.chunks_exact(2).map(uv).collect();
     let three_or_four = [Dimensions::Vec3, Dimensions::Vec4];
     let (values, components) = attribute(&Semantic::Colors(0), &three_or_four)?;
     let colors: Vec<Vec3> = (values.chunks_exact(components.max(3)))
@@ -117,10 +103,10 @@ fn push_primitive(
         .collect();
     let indices: Vec<u32> = match primitive.indices() {
         None => (0..positions.len() as u32).collect(),
-        Some(accessor) => (numbers(&accessor, buffers, &[Dimensions::Scalar])?.0)
-            .iter()
-            .map(|&i| i as u32)
-            .collect(),
+        Some(accessor) => {
+            let (indices, _) = numbers(&accessor, buffers, &[Dimensions::Scalar])?;
+            indices.iter().map(|&i| i as u32).collect()
+        }
     };
 
     let Some(triangles) = gltf_scene::triangles(primitive.mode(), &indices) else {
@@ -131,15 +117,13 @@ fn push_primitive(
     let surface = material.index().map_or(plain, |index| index as u32);
     for [a, b, c] in triangles {
         let order = if mirrored { [a, c, b] } else { [a, b, c] };
-        parts.push(
-            Corners {
-                positions: gather(&positions, order).ok_or("an index is out of range")?,
-                normals: gather(&normals, order),
-                uvs: gather(&uvs, order),
-                colors: gather(&colors, order),
-            },
-            surface,
-        );
+        let corners = Corners {
+            positions: gather(&positions, order).ok_or("an index is out of range")?,
+            normals: gather(&normals, order),
+            uvs: gather(&uvs, order),
+            colors: gather(&colors, order),
+        };
+        parts.push(corners, surface);
     }
     Ok(())
 }
@@ -156,11 +140,8 @@ fn surface(
     images: &mut HashMap<(usize, TextureKind), Arc<Picture>>,
     warnings: &mut Vec<String>,
 ) -> Result<ObjectSurface> {
-    let place = format!(
-        "{}: material `{}`",
-        path.display(),
-        material.name().unwrap_or("unnamed")
-    );
+    let name = material.name().unwrap_or("unnamed");
+    let place = format!("{}: material `{name}`", path.display());
     let pbr = material.pbr_metallic_roughness();
     let [r, g, b, _] = pbr.base_color_factor();
     let mut image = |texture: ::gltf::Texture<'_>, meaning: TextureKind| -> Result<Arc<Picture>> {

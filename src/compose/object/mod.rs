@@ -51,17 +51,13 @@ impl ObjectModel {
             Some("obj") => obj::read(path)?,
             Some("glb" | "gltf") => gltf::read(path)?,
             _ => {
-                return Err(Error::file(
-                    path,
-                    "is no object file",
-                    "give an .obj, .glb or .gltf file",
-                ));
+                let problem = "is no object file";
+                let remedy = "give an .obj, .glb or .gltf file";
+                return Err(Error::file(path, problem, remedy));
             }
         };
-        let name = path
-            .file_stem()
-            .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-        parts.finish(name, path)
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        parts.finish(name.into_owned(), path)
     }
 
     /// Builds an object with one material from triangles.
@@ -101,9 +97,8 @@ impl ObjectModel {
         for ([a, b, c], &material) in self.corners.iter().zip(&self.material_of) {
             areas[material as usize] += (*b - *a).cross(*c - *a).length();
         }
-        let largest = |a: &&(f64, &Material), b: &&(f64, &Material)| a.0.total_cmp(&b.0);
-        let materials: Vec<(f64, &Material)> = areas.into_iter().zip(&self.materials).collect();
-        let main = materials.iter().max_by(largest);
+        let materials = areas.into_iter().zip(&self.materials);
+        let main = materials.max_by(|a, b| a.0.total_cmp(&b.0));
         main.map_or_else(MaterialOverride::default, |(_, material)| {
             MaterialOverride::like(material)
         })
@@ -156,22 +151,18 @@ impl Parts {
     /// Refuses an object with more than [`MAX_TRIANGLES`].
     fn check_size(&self, path: &Path) -> Result<()> {
         if self.triangles.len() > MAX_TRIANGLES {
-            return Err(Error::file(
-                path,
-                format!("has {} triangles or more", self.triangles.len()),
-                format!("reduce the object to {MAX_TRIANGLES} triangles or fewer"),
-            ));
+            let problem = format!("has {} triangles or more", self.triangles.len());
+            let remedy = format!("reduce the object to {MAX_TRIANGLES} triangles or fewer");
+            return Err(Error::file(path, problem, remedy));
         }
         Ok(())
     }
 
     fn finish(mut self, name: String, path: &Path) -> Result<ObjectModel> {
         if self.triangles.is_empty() {
-            return Err(Error::file(
-                path,
-                "holds no triangle with an area",
-                "export the object as a triangle mesh",
-            ));
+            let problem = "holds no triangle with an area";
+            let remedy = "export the object as a triangle mesh";
+            return Err(Error::file(path, problem, remedy));
         }
         self.check_size(path)?;
         for (count, what) in [
@@ -200,11 +191,7 @@ impl Parts {
             corners: corners().map(|c| c.positions).collect(),
             corner_normals: normals.collect(),
             corner_colors: colors.collect(),
-            material_of: self
-                .triangles
-                .iter()
-                .map(|(_, material)| *material)
-                .collect(),
+            material_of: self.triangles.iter().map(|(_, of)| *of).collect(),
             materials: (self.surfaces.iter())
                 .map(|surface| surface.material(Some(&corner_uvs)))
                 .collect(),
@@ -214,20 +201,18 @@ impl Parts {
 }
 
 fn usable_color(color: Vec3) -> Vec3 {
-    if color.is_finite() {
-        color.clamp(Vec3::ZERO, Vec3::ONE)
-    } else {
-        Vec3::ONE
+    match color.is_finite() {
+        true => color.clamp(Vec3::ZERO, Vec3::ONE),
+        false => Vec3::ONE,
     }
 }
 
 /// Texture coordinates; zero where they are not finite or far out of range.
 fn usable_uv(uv: Vec2) -> Vec2 {
     const MANY_REPEATS: f32 = 1e5;
-    if uv.abs().max_element() < MANY_REPEATS && uv.is_finite() {
-        uv
-    } else {
-        Vec2::ZERO
+    match uv.abs().max_element() < MANY_REPEATS && uv.is_finite() {
+        true => uv,
+        false => Vec2::ZERO,
     }
 }
 

@@ -11,7 +11,7 @@ use crate::compose::object::{Corners, Parts, files};
 use crate::error::{Error, Result};
 use crate::math::picture::Picture;
 use crate::transport::material::DIELECTRIC;
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::io::Cursor;
@@ -34,26 +34,18 @@ pub(super) fn read(path: &Path) -> Result<Parts> {
     let library_error = RefCell::new(None);
     let library_path = RefCell::new(path.to_path_buf());
     let loaded = tobj::load_obj_buf(&mut Cursor::new(bytes), &options, |name| {
-        open_library(path, name).map_or_else(
-            |error| {
-                library_error.borrow_mut().get_or_insert(error);
-                Err(tobj::LoadError::OpenFileFailed)
-            },
-            |(found, bytes)| {
-                let bytes = with_three_number_colors(&bytes);
-                *library_path.borrow_mut() = found;
-                tobj::load_mtl_buf(&mut Cursor::new(
-                    bytes.ok_or(tobj::LoadError::MaterialParseError)?,
-                ))
-            },
-        )
+        let (found, bytes) = open_library(path, name).map_err(|error| {
+            library_error.borrow_mut().get_or_insert(error);
+            tobj::LoadError::OpenFileFailed
+        })?;
+        *library_path.borrow_mut() = found;
+        let whole = with_three_number_colors(&bytes);
+        let whole = whole.ok_or(tobj::LoadError::MaterialParseError)?;
+        tobj::load_mtl_buf(&mut Cursor::new(whole))
     });
     let (models, materials) = loaded.map_err(|e| {
-        Error::file(
-            path,
-            format!("is no readable OBJ file: {e}"),
-            "export it again as a triangle mesh",
-        )
+        let problem = format!("is no readable OBJ file: {e}");
+        Error::file(path, problem, "export it again as a triangle mesh")
     })?;
 
     let mut parts = Parts::default();
@@ -62,11 +54,8 @@ pub(super) fn read(path: &Path) -> Result<Parts> {
     }
     let library = library_path.into_inner();
     let materials = materials.map_err(|e| {
-        Error::file(
-            &library,
-            format!("is no readable MTL file: {e}"),
-            "export the object again",
-        )
+        let problem = format!("is no readable MTL file: {e}");
+        Error::file(&library, problem, "export the object again")
     })?;
     let mut textures = HashMap::new();
     for material in &materials {
@@ -75,21 +64,15 @@ pub(super) fn read(path: &Path) -> Result<Parts> {
     }
     // Triangles without a material are grey.
     let plain = parts.surfaces.len() as u32;
-    parts
-        .surfaces
-        .push(ObjectSurface::diffuse(Vec3::splat(0.5)));
+    let grey = ObjectSurface::diffuse(Vec3::splat(0.5));
+    parts.surfaces.push(grey);
 
     for model in &models {
-        let material = model
-            .mesh
-            .material_id
-            .map_or(plain, |id| (id as u32).min(plain));
+        let material = model.mesh.material_id;
+        let material = material.map_or(plain, |id| (id as u32).min(plain));
         push_mesh(&mut parts, &model.mesh, material).ok_or_else(|| {
-            Error::file(
-                path,
-                format!("object `{}` refers to a vertex that it lacks", model.name),
-                "export it again as a triangle mesh",
-            )
+            let problem = format!("object `{}` refers to a vertex that it lacks", model.name);
+            Error::file(path, problem, "export it again as a triangle mesh")
         })?;
     }
     Ok(parts)
@@ -126,43 +109,37 @@ fn with_three_number_colors(bytes: &[u8]) -> Option<String> {
 /// Adds a mesh's triangles; `None` where an index is out of range.
 fn push_mesh(parts: &mut Parts, mesh: &tobj::Mesh, material: u32) -> Option<()> {
     let vector = |values: &[f64], index: u32| {
-        let start = index as usize * 3;
-        let v = values.get(start..start + 3)?;
-        Some(DVec3::new(v[0], v[1], v[2]))
+        let values = values.get(index as usize * 3..)?.first_chunk();
+        values.copied().map(DVec3::from_array)
     };
     for (number, triangle) in mesh.indices.chunks_exact(3).enumerate() {
         // Normals and texture coordinates have indices of their own.
         let corner_indices = |indices: &[u32]| -> Option<[u32; 3]> {
             indices.get(number * 3..number * 3 + 3)?.try_into().ok()
         };
-        let mut positions = [DVec3::ZERO; 3];
-        for (corner, &index) in positions.iter_mut().zip(triangle) {
-            *corner = vector(&mesh.positions, index)?;
-        }
-        let normals = corner_indices(&mesh.normal_indices).and_then(|indices| {
-            let [a, b, c] = indices.map(|i| vector(&mesh.normals, i));
-            Some([a?.as_vec3(), b?.as_vec3(), c?.as_vec3()])
-        });
-        let uvs = corner_indices(&mesh.texcoord_indices).and_then(|indices| {
-            let [a, b, c] = indices.map(|i| {
-                let uv = mesh.texcoords.get(i as usize * 2..i as usize * 2 + 2)?;
-                Some(Vec2::new(uv[0] as f32, uv[1] as f32))
-            });
-            Some([a?, b?, c?])
-        });
-        let [a, b, c] = [triangle[0], triangle[1], triangle[2]]
-            .map(|index| vector(&mesh.vertex_color, index).map(DVec3::as_vec3));
-        parts.push(
-            Corners {
-                positions,
-                normals,
-                uvs,
-                colors: a.zip(b).zip(c).map(|((a, b), c)| [a, b, c]),
-            },
-            material,
-        );
+        let own = [triangle[0], triangle[1], triangle[2]];
+        let narrow = |values: &[f64], index| Some(vector(values, index)?.as_vec3());
+        let normals = corner_indices(&mesh.normal_indices)
+            .and_then(|indices| all(indices.map(|i| narrow(&mesh.normals, i))));
+        let uv = |index: u32| {
+            let uv = mesh.texcoords.get(index as usize * 2..)?.first_chunk()?;
+            Some(DVec2::from_array(*uv).as_vec2())
+        };
+        let uvs = corner_indices(&mesh.texcoord_indices).and_then(|i| all(i.map(uv)));
+        let corners = Corners {
+            positions: all(own.map(|i| vector(&mesh.positions, i)))?,
+            normals,
+            uvs,
+            colors: all(own.map(|i| narrow(&mesh.vertex_color, i))),
+        };
+        parts.push(corners, material);
     }
     Some(())
+}
+
+/// The three values, if there are all.
+fn all<T>([a, b, c]: [Option<T>; 3]) -> Option<[T; 3]> {
+    Some([a?, b?, c?])
 }
 
 /// The surface that an MTL material describes; each texture is read once.
@@ -180,12 +157,10 @@ fn surface(
         Some(_) => Vec3::ONE,
         None => Vec3::splat(0.8),
     };
-    let kd = material
-        .diffuse
-        .map_or(missing, |c| Vec3::from(c.map(|v| v as f32)));
-    let ks = material
-        .specular
-        .map_or(0.0, |c| (c.iter().sum::<f64>() / 3.0) as f32);
+    let linear = |c: [f64; 3]| Vec3::from(c.map(|v| v as f32));
+    let kd = material.diffuse.map_or(missing, linear);
+    let mean = |c: [f64; 3]| (c.iter().sum::<f64>() / 3.0) as f32;
+    let ks = material.specular.map_or(0.0, mean);
     let highlights = material.illumination_model.unwrap_or(2) >= 2 && ks > 0.0;
     let phong = material.shininess.filter(|_| highlights);
     let mut surface = ObjectSurface {
@@ -195,10 +170,9 @@ fn surface(
         alpha: number("Pr")
             .map(|roughness| roughness * roughness)
             .or_else(|| phong.map(|ns| (2.0 / (ns.max(0.0) + 2.0)).sqrt() as f32)),
-        dielectric: if number("Pr").is_some() {
-            DIELECTRIC
-        } else {
-            SPECULAR_OF_KS * ks
+        dielectric: match number("Pr") {
+            Some(_) => DIELECTRIC,
+            None => SPECULAR_OF_KS * ks,
         },
     };
 
@@ -231,10 +205,8 @@ fn surface(
             place()
         ));
     }
-    if material
-        .emissive
-        .is_some_and(|e| e.iter().any(|&v| v > 0.0))
-    {
+    let emits = |e: [f64; 3]| e.iter().any(|&v| v > 0.0);
+    if material.emissive.is_some_and(emits) {
         warnings.push(format!("{}: emission (Ke) is ignored.", place()));
     }
     surface

@@ -2,7 +2,7 @@
 
 use crate::math::picture::Picture;
 use crate::transport::material::{Albedo, DIELECTRIC, Lobe, Material, Texture};
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -75,9 +75,7 @@ impl MaterialOverride {
 
 /// Mean of linear colours.
 pub fn mean(colors: &[Vec3]) -> Vec3 {
-    let sum = colors
-        .iter()
-        .fold(glam::DVec3::ZERO, |sum, c| sum + c.as_dvec3());
+    let sum: DVec3 = colors.iter().map(|c| c.as_dvec3()).sum();
     (sum / colors.len().max(1) as f64).as_vec3()
 }
 
@@ -128,13 +126,11 @@ impl ObjectSurface {
             _ => (Albedo::Constant(diffuse), self.base_color),
         };
         let specular = Vec3::splat(self.dielectric).lerp(mean, self.metallic);
-        let lobe = self
-            .alpha
-            .filter(|_| specular.max_element() > 0.0)
-            .map(|roughness| Lobe {
-                roughness,
-                specular,
-            });
+        let shines = specular.max_element() > 0.0;
+        let lobe = self.alpha.filter(|_| shines).map(|roughness| Lobe {
+            roughness,
+            specular,
+        });
         Material {
             albedo,
             emission: Vec3::ZERO,

@@ -43,16 +43,14 @@ pub fn bowl(m: &mut Modeller, radius: f64) {
 
 /// A conical pot, filled to a little below its rim.
 pub fn pot(m: &mut Modeller, radius: f64, height: f64) {
-    m.lathe(
-        &[
-            [radius * 0.70, 0.0],
-            [radius * 0.97, height * 0.86],
-            [radius, height],
-            [radius * 0.90, height],
-            [radius * 0.86, height * 0.88],
-        ],
-        20,
-    );
+    let outline = [
+        [radius * 0.70, 0.0],
+        [radius * 0.97, height * 0.86],
+        [radius, height],
+        [radius * 0.90, height],
+        [radius * 0.86, height * 0.88],
+    ];
+    m.lathe(&outline, 20);
 }
 
 /// Arching leaves from the origin, up to about `height`.
@@ -82,21 +80,11 @@ pub fn leaves(m: &mut Modeller, count: u32, height: f64) {
 
 /// Foot and pole of a floor lamp, and the cap above its lantern at height `lantern`.
 pub fn lamp_stand(m: &mut Modeller, lantern: f64) {
-    m.lathe(
-        &[
-            [0.15, 0.0],
-            [0.15, 0.015],
-            [0.02, 0.03],
-            [0.011, 0.05],
-            [0.011, lantern - 0.21],
-        ],
-        16,
-    );
+    let foot = [[0.15, 0.0], [0.15, 0.015], [0.02, 0.03], [0.011, 0.05]];
+    m.lathe(&[&foot[..], &[[0.011, lantern - 0.21]]].concat(), 16);
     let top = lantern + 0.21;
-    m.lathe(
-        &[[0.075, top - 0.025], [0.075, top], [0.02, top + 0.02]],
-        16,
-    );
+    let cap = [[0.075, top - 0.025], [0.075, top], [0.02, top + 0.02]];
+    m.lathe(&cap, 16);
 }
 
 /// A slightly flattened round lantern at height `lantern`.

@@ -1,35 +1,19 @@
 //! Tables, cabinets, frames and the door.
 
-use crate::room::furniture::pad;
+use crate::room::furniture::{legs, pad};
 use crate::room::shape::{Modeller, Projection};
 use crate::room::texture::{SPINES, hash};
 use glam::{DVec2, DVec3};
 
 /// A table with a slab and four round legs.
 pub fn table(m: &mut Modeller, width: f64, depth: f64, height: f64) {
-    pad(
-        m,
-        [-width * 0.5, height - 0.035, -depth * 0.5],
-        [width, 0.035, depth],
-        0.012,
-    );
-    pad(
-        m,
-        [-width * 0.5 + 0.09, 0.15, -depth * 0.5 + 0.07],
-        [width - 0.18, 0.02, depth - 0.14],
-        0.006,
-    );
-    for x in [-1.0, 1.0] {
-        for z in [-1.0, 1.0] {
-            let top = DVec3::new(
-                x * (width * 0.5 - 0.09),
-                height - 0.03,
-                z * (depth * 0.5 - 0.08),
-            );
-            let foot = DVec3::new(top.x + 0.03 * x, 0.0, top.z + 0.02 * z);
-            m.bar(foot, top, [0.014, 0.022], 8);
-        }
-    }
+    let [left, back] = [-width * 0.5, -depth * 0.5];
+    let slab = [left, height - 0.035, back];
+    pad(m, slab, [width, 0.035, depth], 0.012);
+    let shelf = [left + 0.09, 0.15, back + 0.07];
+    pad(m, shelf, [width - 0.18, 0.02, depth - 0.14], 0.006);
+    let half = [width * 0.5 - 0.09, depth * 0.5 - 0.08];
+    legs(m, half, height - 0.03, [0.03, 0.02], [0.014, 0.022]);
 }
 
 /// Heights of the boards of [`bookcase`], floor to top.
@@ -37,23 +21,17 @@ pub const BOARDS: [f64; 6] = [0.06, 0.43, 0.78, 1.12, 1.45, 1.76];
 
 /// An open bookcase with a back panel.
 pub fn bookcase(m: &mut Modeller, width: f64, depth: f64) {
-    let half = width * 0.5;
+    let (half, back, front) = (width * 0.5, -depth * 0.5, depth * 0.5);
+    let mut cuboid = |low: [f64; 3], high: [f64; 3]| m.cuboid(low.into(), high.into());
     let top = BOARDS[BOARDS.len() - 1];
     for x in [-half, half - 0.025] {
-        m.cuboid(
-            DVec3::new(x, 0.0, -depth * 0.5),
-            DVec3::new(x + 0.025, top + 0.025, depth * 0.5),
-        );
+        cuboid([x, 0.0, back], [x + 0.025, top + 0.025, front]);
     }
-    m.cuboid(
-        DVec3::new(-half + 0.025, 0.06, -depth * 0.5),
-        DVec3::new(half - 0.025, top, -depth * 0.5 + 0.012),
-    );
+    let (left, right) = (-half + 0.025, half - 0.025);
+    cuboid([left, 0.06, back], [right, top, back + 0.012]);
     for y in BOARDS {
-        m.cuboid(
-            DVec3::new(-half + 0.025, y, -depth * 0.5 + 0.012),
-            DVec3::new(half - 0.025, y + 0.025, depth * 0.5 - 0.002),
-        );
+        let high = [right, y + 0.025, front - 0.002];
+        cuboid([left, y, back + 0.012], high);
     }
 }
 
@@ -84,10 +62,8 @@ pub fn books(m: &mut Modeller, width: f64, depth: f64) {
                 offset: DVec2::new(column, 0.0),
             });
             let front = depth * 0.5 - 0.03;
-            m.cuboid(
-                DVec3::new(x, floor, front - deep),
-                DVec3::new(x + thick - 0.001, floor + tall, front),
-            );
+            let low = DVec3::new(x, floor, front - deep);
+            m.cuboid(low, DVec3::new(x + thick - 0.001, floor + tall, front));
             along += thick + 0.001;
             spine += 1;
         }
@@ -96,50 +72,30 @@ pub fn books(m: &mut Modeller, width: f64, depth: f64) {
 
 /// A low cabinet with two door panels on slender feet.
 pub fn sideboard(m: &mut Modeller, width: f64, depth: f64, height: f64) {
-    pad(
-        m,
-        [-width * 0.5, 0.16, -depth * 0.5],
-        [width, height - 0.16, depth - 0.015],
-        0.01,
-    );
-    let panel = width * 0.5 - 0.03;
+    let size = [width, height - 0.16, depth - 0.015];
+    pad(m, [-width * 0.5, 0.16, -depth * 0.5], size, 0.01);
+    let panel = [width * 0.5 - 0.03, height - 0.22, 0.02];
     for x in [-width * 0.5 + 0.02, 0.01] {
-        pad(
-            m,
-            [x, 0.19, depth * 0.5 - 0.02],
-            [panel, height - 0.22, 0.02],
-            0.006,
-        );
+        pad(m, [x, 0.19, depth * 0.5 - 0.02], panel, 0.006);
     }
-    for x in [-1.0, 1.0] {
-        for z in [-1.0, 1.0] {
-            let top = DVec3::new(x * (width * 0.5 - 0.12), 0.165, z * (depth * 0.5 - 0.08));
-            m.bar(DVec3::new(top.x, 0.0, top.z), top, [0.012, 0.018], 8);
-        }
-    }
+    let half = [width * 0.5 - 0.12, depth * 0.5 - 0.08];
+    legs(m, half, 0.165, [0.0; 2], [0.012, 0.018]);
 }
 
 /// A door leaf with two panels, handle and casing; its face is near z = 0.
 pub fn door(m: &mut Modeller) {
-    let (width, height) = (0.86, 2.02);
-    m.cuboid(
-        DVec3::new(-width * 0.5, 0.0, -0.02),
-        DVec3::new(width * 0.5, height, 0.02),
-    );
+    let (half, height, casing) = (0.86 * 0.5, 2.02, 0.07);
+    let cuboid =
+        |m: &mut Modeller, low: [f64; 3], high: [f64; 3]| m.cuboid(low.into(), high.into());
+    cuboid(m, [-half, 0.0, -0.02], [half, height, 0.02]);
     for (low, high) in [(0.15, 0.85), (1.0, 1.87)] {
         pad(m, [-0.30, low, 0.015], [0.60, high - low, 0.017], 0.006);
     }
-    let casing = 0.07;
-    for x in [-width * 0.5 - casing, width * 0.5] {
-        m.cuboid(
-            DVec3::new(x, 0.0, -0.02),
-            DVec3::new(x + casing, height + casing, 0.035),
-        );
+    let top = height + casing;
+    for x in [-half - casing, half] {
+        cuboid(m, [x, 0.0, -0.02], [x + casing, top, 0.035]);
     }
-    m.cuboid(
-        DVec3::new(-width * 0.5, height, -0.02),
-        DVec3::new(width * 0.5, height + casing, 0.035),
-    );
+    cuboid(m, [-half, height, -0.02], [half, top, 0.035]);
     let handle = DVec3::new(-0.36, 1.02, 0.0);
     m.bar(handle, handle + DVec3::Z * 0.07, [0.012, 0.012], 8);
     let grip = handle + DVec3::new(-0.01, 0.0, 0.065);
@@ -150,18 +106,13 @@ pub fn door(m: &mut Modeller) {
 pub fn rim(m: &mut Modeller, width: f64, height: f64, thick: f64, deep: f64) {
     let (x, y) = (width * 0.5, height * 0.5);
     for sign in [-1.0, 1.0] {
-        let bars = [
-            (
-                DVec3::new(sign * (x - thick * 0.5), 0.0, deep * 0.5),
-                DVec3::new(thick, height, deep),
-            ),
-            (
-                DVec3::new(0.0, sign * (y - thick * 0.5), deep * 0.5),
-                DVec3::new(width - 2.0 * thick, thick, deep),
-            ),
-        ];
-        for (center, size) in bars {
-            m.rounded_box(center, size * 0.5, 0.0, 0);
-        }
+        let mut bar = |center: [f64; 2], size: [f64; 2]| {
+            let [center, size] = [center, size].map(DVec2::from);
+            let half = size.extend(deep) * 0.5;
+            m.rounded_box(center.extend(deep * 0.5), half, 0.0, 0);
+        };
+        bar([sign * (x - thick * 0.5), 0.0], [thick, height]);
+        let inner = width - 2.0 * thick;
+        bar([0.0, sign * (y - thick * 0.5)], [inner, thick]);
     }
 }

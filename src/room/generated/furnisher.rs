@@ -66,11 +66,9 @@ impl Furnisher {
             outside: None,
             samples: 0,
         };
-        furnisher.size = DVec3::new(
-            furnisher.scaled(2.4, 8.0),
-            furnisher.between(2.3, 3.6),
-            furnisher.scaled(2.4, 8.0),
-        );
+        let width = furnisher.scaled(2.4, 8.0);
+        let height = furnisher.between(2.3, 3.6);
+        furnisher.size = DVec3::new(width, height, furnisher.scaled(2.4, 8.0));
         furnisher
     }
 
@@ -241,10 +239,8 @@ impl Furnisher {
     pub fn look(&mut self, eye: DVec3, target: DVec3) {
         // A level camera is not defined for looking straight up or down.
         let ahead = (eye - target).with_y(0.0).length() > 0.2;
-        self.views.push(View::towards(
-            eye,
-            if ahead { target } else { target + DVec3::X },
-        ));
+        let target = if ahead { target } else { target + DVec3::X };
+        self.views.push(View::towards(eye, target));
     }
 
     /// Draws the samples per pixel of the photographs, hence their noise.
@@ -255,22 +251,16 @@ impl Furnisher {
     /// Draws a point on the floor at least `radius` from the walls, if the room is large enough.
     pub fn place(&mut self, radius: f64) -> DVec2 {
         let reach = (DVec2::new(self.size.x, self.size.z) * 0.5 - radius - 0.05).max(DVec2::ZERO);
-        DVec2::new(
-            self.between(-reach.x, reach.x),
-            self.between(-reach.y, reach.y),
-        )
+        DVec2::from(reach.to_array().map(|reach| self.between(-reach, reach)))
     }
 
     /// Draws a point on the floor whose circle of `radius` is free.
     pub fn free_point(&mut self, radius: f64) -> Option<DVec2> {
-        (0..ATTEMPTS)
-            .map(|_| self.place(radius))
-            .collect::<Vec<_>>()
-            .into_iter()
-            .find(|at| {
-                let clear = |(center, other): &(DVec2, f64)| at.distance(*center) > radius + other;
-                self.occupied.iter().all(clear)
-            })
+        let tried: Vec<DVec2> = (0..ATTEMPTS).map(|_| self.place(radius)).collect();
+        tried.into_iter().find(|at| {
+            let clear = |(center, other): &(DVec2, f64)| at.distance(*center) > radius + other;
+            self.occupied.iter().all(clear)
+        })
     }
 
     /// Draws a free point and occupies its circle.
@@ -284,10 +274,8 @@ impl Furnisher {
 /// Corner and two sides of each wall of a room: north, south, west and east.
 pub fn walls(size: DVec3) -> [[DVec3; 3]; 4] {
     let half = size * 0.5;
-    let (low, high) = (
-        DVec3::new(-half.x, 0.0, -half.z),
-        DVec3::new(half.x, size.y, half.z),
-    );
+    let low = DVec3::new(-half.x, 0.0, -half.z);
+    let high = DVec3::new(half.x, size.y, half.z);
     let [width, height, depth] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * size);
     [
         [low, width, height],

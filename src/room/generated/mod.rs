@@ -4,7 +4,6 @@
 //! (family, seed, size) gives the same bits.
 
 mod clutter;
-mod draft;
 mod family;
 mod furnisher;
 mod glossy;
@@ -24,8 +23,8 @@ pub use photographed::Generated;
 use crate::error::Result;
 use crate::room::Room;
 use crate::room::photographs::{self, Rendering};
-use draft::Draft;
 use furnisher::Furnisher;
+use photographed::Draft;
 
 /// Furnishes room `seed` of a family for photographs of a size in pixels.
 fn draft(family: Family, seed: u64, size: [u32; 2]) -> Draft {

@@ -1,11 +1,10 @@
 //! Rooms with textures on most surfaces.
 
 use crate::math::picture::Picture;
+use crate::room::build::print;
 use crate::room::generated::furnisher::Furnisher;
 use crate::room::texture::hash;
-use crate::transport::material::{Albedo, Texture};
 use glam::{DVec2, DVec3, Vec2, Vec3};
-use std::sync::Arc;
 
 /// Side of a pattern's picture in pixels.
 const SIDE: u32 = 128;
@@ -35,16 +34,7 @@ pub fn paint(f: &mut Furnisher, fraction: f64) {
             chosen.push((object, pattern(f)));
         }
     }
-    let corner_uvs = Arc::new(f.modeller.mesh.corner_uvs.clone());
-    for (object, picture) in chosen {
-        let texture = Texture {
-            width: picture.width,
-            height: picture.height,
-            pixels: picture.pixels,
-            corner_uvs: corner_uvs.clone(),
-        };
-        f.materials[object].albedo = Albedo::Image(Arc::new(texture), Vec3::ONE);
-    }
+    print(&mut f.materials, &f.modeller.mesh, chosen);
 }
 
 /// Sets an object's texture coordinates by projecting each triangle along its dominant axis, rotated by a random angle.
@@ -57,9 +47,8 @@ fn project(f: &mut Furnisher, object: u32) {
             continue;
         }
         let corners = mesh.triangles[triangle].map(|i| mesh.positions[i as usize]);
-        let normal = (corners[1] - corners[0])
-            .cross(corners[2] - corners[0])
-            .abs();
+        let [a, b, c] = corners;
+        let normal = (b - a).cross(c - a).abs();
         let flat = |p: DVec3| match normal.max_element() {
             max if max == normal.x => DVec2::new(p.z, p.y),
             max if max == normal.y => DVec2::new(p.x, p.z),
@@ -85,7 +74,7 @@ fn pattern(f: &mut Furnisher) -> Picture {
             0 => stripes(p, repeats, &colors),
             1 => checks(p, repeats, &colors),
             2 => colors[0].lerp(colors[1], noise(p, key)),
-            _ => print(p, repeats, key, &colors),
+            _ => discs(p, repeats, key, &colors),
         }
     })
 }
@@ -121,7 +110,7 @@ fn noise(p: Vec2, key: u32) -> f32 {
 }
 
 /// Discs of different sizes, each with a rim.
-fn print(p: Vec2, repeats: f32, key: u32, colors: &[Vec3; 3]) -> Vec3 {
+fn discs(p: Vec2, repeats: f32, key: u32, colors: &[Vec3; 3]) -> Vec3 {
     let q = p * repeats * 2.0;
     let cell = q.floor();
     let radius = 0.2 + 0.25 * hash(cell.x as u32 + 64 * cell.y as u32, key);

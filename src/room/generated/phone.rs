@@ -4,12 +4,12 @@ use crate::capture::camera::Intrinsics;
 use crate::capture::exposure::{Exposure, Vignetting};
 use crate::capture::photograph::{Encoding, Photograph};
 use crate::error::{Error, Result};
-use crate::math::color::{luminance, srgb_to_linear, to_srgb8};
+use crate::export::picture::to_srgb_bytes;
+use crate::math::color::{luminance, srgb_to_linear};
 use crate::math::picture::Picture;
 use crate::math::rng::Stream;
-use crate::room::generated::draft::Draft;
 use crate::room::generated::furnisher::Furnisher;
-use crate::room::generated::photographed::Generated;
+use crate::room::generated::photographed::{Draft, Generated};
 use crate::room::photographs::render_lit;
 use crate::transport::lit::LitScene;
 use glam::Vec3;
@@ -38,10 +38,8 @@ pub fn photograph(draft: Draft) -> Result<Generated> {
     let rendered = render_lit(&lit, &draft.rendering);
     let rendered: Vec<Picture> = rendered.iter().map(Photograph::picture).collect();
     let files = files(&draft, &lit, &rendered)?;
-    let photographs = files
-        .iter()
-        .map(|file| decode(file))
-        .collect::<Result<_>>()?;
+    let photographs = files.iter().map(|file| decode(file));
+    let photographs = photographs.collect::<Result<_>>()?;
     Ok(draft.photographed(lit, photographs))
 }
 
@@ -137,18 +135,11 @@ fn blurred(picture: &Picture, sigma: f64) -> Picture {
 }
 
 fn encode(picture: &Picture, quality: u8) -> Result<Vec<u8>> {
-    let values: Vec<u8> = (picture.pixels.iter())
-        .flat_map(|pixel| to_srgb8(*pixel, 1.0))
-        .collect();
+    let (values, format) = (to_srgb_bytes(picture, 1.0), ExtendedColorType::Rgb8);
     let mut file = Vec::new();
-    JpegEncoder::new_with_quality(&mut file, quality)
-        .encode(
-            &values,
-            picture.width,
-            picture.height,
-            ExtendedColorType::Rgb8,
-        )
-        .map_err(|error| broken(&error))?;
+    let mut encoder = JpegEncoder::new_with_quality(&mut file, quality);
+    let encoded = encoder.encode(&values, picture.width, picture.height, format);
+    encoded.map_err(|error| broken(&error))?;
     Ok(file)
 }
 

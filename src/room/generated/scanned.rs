@@ -9,9 +9,8 @@ use crate::error::{Error, Result};
 use crate::math::picture::Picture;
 use crate::math::rng::Stream;
 use crate::room::cameras;
-use crate::room::generated::draft::Draft;
 use crate::room::generated::furnisher::Furnisher;
-use crate::room::generated::photographed::Generated;
+use crate::room::generated::photographed::{Draft, Generated};
 use crate::room::generated::{patterned, phone, window};
 use crate::room::photographs::{Rendering, render_lit};
 use crate::scene::Scene;
@@ -90,25 +89,18 @@ pub fn scan(draft: Draft) -> Result<Generated> {
     let (voxel, _) = voxel_size(&frames, None)?;
     let mesh = fuse(&frames, voxel, MAX_BYTES, &mut |_, _| {})?;
 
-    let photographs = files
-        .iter()
-        .map(|file| phone::decode(file))
-        .collect::<Result<_>>()?;
-    let mut capture = draft.room.capture_of(photographs, draft.rendering.size);
-    for (frame, imported) in capture.frames.iter_mut().zip(&frames) {
+    let photographs = files.iter().map(|file| phone::decode(file));
+    let photographs = photographs.collect::<Result<_>>()?;
+    let mut scanned = draft.photographed(lit, photographs);
+    for (frame, imported) in scanned.capture.frames.iter_mut().zip(&frames) {
         frame.pose = imported.pose;
     }
-    capture.mesh = mesh;
-    capture.segmentation = Some(Segmentation {
+    scanned.capture.mesh = mesh;
+    scanned.capture.segmentation = Some(Segmentation {
         file: PathBuf::from("fused mesh"),
         wanted: None,
     });
-    Ok(Generated {
-        family: draft.family,
-        seed: draft.seed,
-        capture,
-        lit,
-    })
+    Ok(scanned)
 }
 
 /// Denoised renderings of all views. The rare bright samples of a path tracer are no noise of a camera: poses would follow them,
@@ -159,9 +151,8 @@ fn measure(scene: &Scene, camera: &Camera, stream: &mut Stream) -> Vec<f64> {
             return 0.0;
         };
         let depth = f64::from(hit.t * ray.direction.dot(camera.forward()));
-        let cosine = scene.normals[hit.triangle as usize]
-            .dot(ray.direction)
-            .abs();
+        let normal = scene.normals[hit.triangle as usize];
+        let cosine = normal.dot(ray.direction).abs();
         if depth > MAX_DEPTH || cosine < MIN_COSINE {
             return 0.0;
         }

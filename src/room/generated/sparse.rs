@@ -4,9 +4,8 @@ use crate::error::Result;
 use crate::math::color::luminance;
 use crate::math::rng::{Stream, splitmix64};
 use crate::math::stats::quantile;
-use crate::room::generated::draft::Draft;
 use crate::room::generated::furnisher::Furnisher;
-use crate::room::generated::photographed::Generated;
+use crate::room::generated::photographed::{Draft, Generated};
 use crate::room::model::linear_photograph;
 use crate::scene::camera::Camera;
 use crate::transport::film::Film;
@@ -46,9 +45,8 @@ pub fn photograph(draft: Draft) -> Result<Generated> {
     let noise = NOISE[0] + (NOISE[1] - NOISE[0]) * stream.uniform_f64();
     let photographs = (0..).zip(&lit.scene.cameras).map(|(frame, camera)| {
         let (mut pixels, rendered_noise) = trace(&lit, camera, draft.rendering.seed, frame, noise);
-        let missing = (noise * noise - rendered_noise * rendered_noise)
-            .max(0.0)
-            .sqrt();
+        let missing = noise * noise - rendered_noise * rendered_noise;
+        let missing = missing.max(0.0).sqrt();
         for pixel in &mut pixels {
             let factor = Vec3::from([(); 3].map(|()| stream.normal()));
             *pixel *= (Vec3::ONE + factor * missing as f32).max(Vec3::ZERO);

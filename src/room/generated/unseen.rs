@@ -5,6 +5,7 @@ use crate::room::furniture::vessels;
 use crate::room::generated::furnisher::{EYE_HEIGHT, Furnisher};
 use crate::transport::material::Material;
 use glam::{DAffine3, DVec3};
+use std::f64::consts::FRAC_PI_2;
 
 /// Attempts at finding a place outside of all fields of view.
 const ATTEMPTS: u32 = 60;
@@ -62,18 +63,14 @@ fn bowl(f: &mut Furnisher, index: usize, name: &str, lamp: Material) {
 fn cove(f: &mut Furnisher, index: usize, name: &str, lamp: Material) {
     let along_x = f.count(0, 1) == 0;
     let side = [-1.0, 1.0][f.count(0, 1)];
-    let (length, across) = match along_x {
-        true => (f.size.x, f.size.z),
-        false => (f.size.z, f.size.x),
+    let (length, across, turn) = match along_x {
+        true => (f.size.x, f.size.z, DAffine3::IDENTITY),
+        false => (f.size.z, f.size.x, DAffine3::from_rotation_y(FRAC_PI_2)),
     };
     let length = length * f.between(0.3, 0.95);
     let (deep, thick) = (f.between(0.12, 0.25), 0.04);
     let lowest = EYE_HEIGHT[1] + 0.1;
     let top = f.between(lowest, lowest + MAX_LIFT * (f.size.y - lowest));
-    let turn = match along_x {
-        true => DAffine3::IDENTITY,
-        false => DAffine3::from_rotation_y(std::f64::consts::FRAC_PI_2),
-    };
     // Local coordinates with x along the wall.
     let middle = side * (across * 0.5 - deep * 0.5 - 0.005);
     f.plain(&format!("ledge-{index}"), [0.3, 0.9], |m| {

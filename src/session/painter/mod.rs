@@ -55,9 +55,8 @@ impl Painter {
     pub fn new(requests: Arc<Requests>, slot: Arc<Slot>, wake: Wake) -> Result<Self> {
         let threads = ThreadPoolBuilder::new()
             .num_threads(rayon::current_num_threads())
-            .thread_name(|index| format!("relit-painter-{index}"))
-            .build();
-        let threads = threads.map_err(|error| {
+            .thread_name(|index| format!("relit-painter-{index}"));
+        let threads = threads.build().map_err(|error| {
             let remedy = "close other programs and start again";
             Error::new("painter threads", error, remedy)
         })?;

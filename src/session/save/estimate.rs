@@ -7,11 +7,13 @@ use crate::inverse::estimate::{Estimate, ObjectEstimate};
 use crate::inverse::settings::{PARAMETERS, Settings};
 use crate::inverse::solver::{Checkpoint, Termination};
 use crate::math::nullable::{Rgb, rgb};
+use crate::scene::Object;
 use crate::session::command::{OpenOptions, Source};
-use crate::session::edits::{Edits, EditsRecord};
+use crate::session::edits::EditsRecord;
 use crate::session::open_capture::OpenCapture;
 use crate::session::save::maps::{self, Maps};
 use crate::session::save::named::Named;
+use crate::session::save::results::Results;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use std::fs;
@@ -85,14 +87,8 @@ impl EstimateFile {
     ///
     /// # Errors
     /// The maps do not fit their layout.
-    pub fn new(
-        folder: &Path,
-        capture: &OpenCapture,
-        settings: &Settings,
-        estimate: &Estimate,
-        edits: &Edits,
-        stopped_because: Option<Termination>,
-    ) -> Result<(Self, Option<Vec<u8>>)> {
+    pub fn new(folder: &Path, results: &Results) -> Result<(Self, Option<Vec<u8>>)> {
+        let (capture, estimate) = (&results.capture, &results.estimate);
         let bytes = maps::encode(estimate)?;
         // Named by its content, so that estimate.json never refers to maps of another run.
         let maps = bytes.as_ref().map(|bytes| {
@@ -104,15 +100,15 @@ impl EstimateFile {
             version: VERSION,
             relit: env!("CARGO_PKG_VERSION").to_owned(),
             capture: CaptureReference::new(folder, capture),
-            settings: settings.clone(),
-            stopped_because,
+            settings: results.settings.clone(),
+            stopped_because: results.stopped_because,
             objects: Named::objects(&capture.scene, estimate),
             maps,
             exposures: exposures.map(|all| all.iter().copied().map(rgb).collect()),
             vignetting: estimate.vignetting.map(|v| rgb(v.power)),
             response: estimate.response.map(|r| r.terms.map(rgb)),
             albedo_common_stderr: estimate.common_error,
-            edits: edits.record(&capture.scene),
+            edits: results.edits.record(&capture.scene),
         };
         Ok((file, bytes))
     }
@@ -123,11 +119,9 @@ impl EstimateFile {
     /// The version is newer, or a value is out of range.
     pub fn check(&self, path: &Path) -> Result<()> {
         if self.version > VERSION {
-            return Err(Error::new(
-                format!("{}: version", path.display()),
-                format!("{} is newer than {VERSION}, the newest known", self.version),
-                "use a newer relit",
-            ));
+            let place = format!("{}: version", path.display());
+            let problem = format!("{} is newer than {VERSION}, the newest known", self.version);
+            return Err(Error::new(place, problem, "use a newer relit"));
         }
         let mut settings = Settings::default();
         for parameter in PARAMETERS {
@@ -138,11 +132,9 @@ impl EstimateFile {
             })?;
         }
         let impossible = |field: &str| {
-            Err(Error::new(
-                format!("{}: {field}", path.display()),
-                "holds an impossible value",
-                "correct it, or solve again",
-            ))
+            let place = format!("{}: {field}", path.display());
+            let remedy = "correct it, or solve again";
+            Err(Error::new(place, "holds an impossible value", remedy))
         };
         for (name, object) in &self.objects.0 {
             if let Some(field) = object.impossible() {
@@ -176,11 +168,9 @@ impl EstimateFile {
         };
         let path = folder.join(name);
         if Path::new(name).file_name() != Some(name.as_ref()) {
-            return Err(Error::file(
-                &path,
-                "maps have to lie beside estimate.json",
-                "put the file there and name it without a folder",
-            ));
+            let problem = "maps have to lie beside estimate.json";
+            let remedy = "put the file there and name it without a folder";
+            return Err(Error::file(&path, problem, remedy));
         }
         maps::decode(&path, &read_whole(&path)?)
     }
@@ -191,36 +181,27 @@ impl EstimateFile {
     /// An object of the capture has no entry, or the maps belong to another mesh.
     pub fn estimate(&self, path: &Path, maps: &Maps, capture: &OpenCapture) -> Result<Estimate> {
         let scene = &capture.scene;
-        let place = |field: &str| format!("{}: {field}", path.display());
-        let objects = scene
-            .objects
-            .iter()
-            .map(|object| {
-                self.objects.get(&object.name).cloned().ok_or_else(|| {
-                    Error::new(
-                        place("objects"),
-                        format!("no entry for object \"{}\" of the capture", object.name),
-                        "name the capture it was made from, or solve again",
-                    )
-                })
-            })
-            .collect::<Result<Vec<_>>>()?;
-        let misfit = |field: &str| {
-            Error::new(
-                place(field),
-                "does not fit the capture's mesh",
-                "name the capture it was made from, or solve again",
-            )
+        let wrong = |field: &str, problem: &str| {
+            let remedy = "name the capture it was made from, or solve again";
+            Error::new(format!("{}: {field}", path.display()), problem, remedy)
         };
+        let entry = |object: &Object| {
+            self.objects.get(&object.name).cloned().ok_or_else(|| {
+                let problem = format!("no entry for object \"{}\" of the capture", object.name);
+                wrong("objects", &problem)
+            })
+        };
+        let objects: Vec<_> = scene.objects.iter().map(entry).collect::<Result<_>>()?;
+        let misfit = "does not fit the capture's mesh";
         if let Some(texels) = &maps.texels
             && (texels.colors.layout.levels.len() != scene.triangles.len()
                 || texels.textured.len() != objects.len())
         {
-            return Err(misfit("maps"));
+            return Err(wrong("maps", misfit));
         }
         let exposures = self.exposures.as_ref();
         if exposures.is_some_and(|all| all.len() != scene.cameras.len()) {
-            return Err(misfit("exposures"));
+            return Err(wrong("exposures", misfit));
         }
         let exposure = |rgb: &Rgb| Vec3::from_array(rgb.map(|v| v.unwrap_or(1.0)));
         Ok(Estimate {
@@ -235,15 +216,13 @@ impl EstimateFile {
     }
 
     fn vignetting(&self) -> Option<Vignetting> {
-        self.vignetting.map(|power| Vignetting {
-            power: color(power),
-        })
+        let power = self.vignetting.map(color)?;
+        Some(Vignetting { power })
     }
 
     fn response(&self) -> Option<Response> {
-        self.response.map(|terms| Response {
-            terms: terms.map(color),
-        })
+        let terms = self.response?.map(color);
+        Some(Response { terms })
     }
 }
 

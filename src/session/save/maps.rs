@@ -39,19 +39,10 @@ pub fn encode(estimate: &Estimate) -> Result<Option<Vec<u8>>> {
         let count = texels.colors.layout.len();
         let rgb = [count, 3];
         let seen = texels.seen.iter().flat_map(|n| n.to_le_bytes()).collect();
+        let (albedo, stderr) = (&texels.colors.colors, &texels.stderr);
         add("texel_levels", U8, &[levels.len()], levels.clone());
-        add(
-            "texel_albedo",
-            F32,
-            &rgb,
-            color_bytes(&texels.colors.colors),
-        );
-        add(
-            "texel_albedo_stderr",
-            F32,
-            &rgb,
-            color_bytes(&texels.stderr),
-        );
+        add("texel_albedo", F32, &rgb, color_bytes(albedo));
+        add("texel_albedo_stderr", F32, &rgb, color_bytes(stderr));
         add("texel_seen", U32, &[count], seen);
         add("textured", U8, &[textured.len()], flag_bytes(textured));
     }
@@ -100,8 +91,8 @@ pub fn decode(path: &Path, bytes: &[u8]) -> Result<Maps> {
     let file = SafeTensors::deserialize(bytes)
         .map_err(|error| Error::file(path, error, "solve or save again"))?;
     let read = Tensors { path, file };
-    let texels = read.optional("texel_levels", U8)?;
-    let texels = texels
+    let levels = read.optional("texel_levels", U8)?;
+    let texels = levels
         .map(|levels| read.texels(levels.data()))
         .transpose()?;
     let outside = read.optional("outside", F32)?;
@@ -126,10 +117,9 @@ impl<'a> Tensors<'a> {
     }
 
     fn required(&self, name: &str, dtype: Dtype, bytes: usize) -> Result<&'a [u8]> {
-        match self.optional(name, dtype)? {
-            Some(tensor) if tensor.data().len() == bytes => Ok(tensor.data()),
-            _ => Err(self.misfit(name)),
-        }
+        let fitting =
+            |tensor: &TensorView<'a>| (tensor.data().len() == bytes).then(|| tensor.data());
+        (self.part(name, dtype, fitting)?).ok_or_else(|| self.misfit(name))
     }
 
     /// What `read` makes of a tensor, which fits unless that is `None`; `None` without the tensor.
@@ -183,10 +173,8 @@ impl<'a> Tensors<'a> {
 
     fn texels(&self, levels: &[u8]) -> Result<TexelEstimate> {
         // Higher levels would overflow the number of texels.
-        let total: u64 = levels
-            .iter()
-            .map(|&level| 1u64.checked_shl(2 * u32::from(level)).unwrap_or(u64::MAX))
-            .fold(0, u64::saturating_add);
+        let of = |&level: &u8| 1u64.checked_shl(2 * u32::from(level)).unwrap_or(u64::MAX);
+        let total = levels.iter().map(of).fold(0, u64::saturating_add);
         if total > u64::from(u32::MAX) {
             return Err(self.misfit("texel_levels"));
         }
@@ -208,11 +196,9 @@ impl<'a> Tensors<'a> {
     }
 
     fn misfit(&self, name: &str) -> Error {
-        Error::new(
-            format!("{}: {name}", self.path.display()),
-            "missing or of another shape than the rest",
-            "solve or save again",
-        )
+        let problem = "missing or of another shape than the rest";
+        let remedy = "solve or save again";
+        Error::new(format!("{}: {name}", self.path.display()), problem, remedy)
     }
 }
 
@@ -285,11 +271,9 @@ mod tests {
         let [far, dark] = [Vec3::new(3.0, 0.0, 0.0), Vec3::NEG_ONE];
         for (direction, irradiance) in [(far, Vec3::ONE), (Vec3::NAN, Vec3::ONE), (Vec3::Y, dark)] {
             let mut estimate = estimate();
-            let sun = Sun {
-                direction,
-                irradiance,
-            };
-            estimate.outside.as_mut().expect("outside").sun = Some(sun);
+            let sun = estimate.outside.as_mut().and_then(|o| o.sun.as_mut());
+            let sun = sun.expect("a sun");
+            (sun.direction, sun.irradiance) = (direction, irradiance);
             let bytes = encode(&estimate).expect("encodes").expect("has maps");
             let maps = decode(Path::new("maps"), &bytes);
             let error = maps.map(drop).expect_err("no sun");

@@ -5,10 +5,9 @@ use sysinfo::{ProcessRefreshKind, ProcessesToUpdate, System, get_current_pid};
 
 /// Peak resident memory in bytes where the system records it (Linux), else the current one.
 pub fn peak_memory_bytes() -> Option<u64> {
-    fs::read_to_string("/proc/self/status")
-        .ok()
-        .and_then(|status| high_water_mark(&status))
-        .or_else(resident_bytes)
+    let status = fs::read_to_string("/proc/self/status").ok();
+    let peak = status.and_then(|status| high_water_mark(&status));
+    peak.or_else(resident_bytes)
 }
 
 /// Peak memory in bytes from the `VmHWM` line of a Linux process status, in KiB.

@@ -12,12 +12,12 @@ use crate::session::save::results::Results;
 use crate::transport::denoise::Denoiser;
 use crate::transport::sun::Sun;
 use crate::transport::surroundings::Surroundings;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 /// The content of `report.json`. Times in seconds, linear radiance.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
     /// The program's version.
     pub relit: String,
@@ -72,7 +72,7 @@ pub struct Report {
 }
 
 /// The size of a capture.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Counts {
     /// Triangles of the mesh.
     pub triangles: usize,
@@ -85,7 +85,7 @@ pub struct Counts {
 }
 
 /// Summary of the light from outside; the map is beside `estimate.json`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OutsideSummary {
     /// Columns of the map.
     pub width: u32,
@@ -96,10 +96,8 @@ pub struct OutsideSummary {
     /// Largest luminance.
     pub brightest: Option<f32>,
     /// Its distance.
-    #[serde(default)]
-    pub from: String,
+    pub from: &'static str,
     /// The sun beyond a box. Far away, the sun is a pixel of the map.
-    #[serde(default)]
     pub sun: Option<Sun>,
 }
 
@@ -157,8 +155,7 @@ impl Report {
                     from: match outside.surroundings {
                         Surroundings::Far => "far away",
                         Surroundings::Box { .. } => "a box around the mesh",
-                    }
-                    .to_owned(),
+                    },
                     sun: outside.sun,
                 }
             }),

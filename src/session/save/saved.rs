@@ -92,14 +92,13 @@ impl Saved {
     /// The capture is another one, or has changed.
     pub fn estimate_for(&self, capture: &OpenCapture) -> Result<Estimate> {
         if self.file.capture.hash != capture.hash {
-            return Err(Error::new(
-                format!("{}: capture.hash", self.path.display()),
-                format!(
-                    "the mesh, the cameras or the photographs of {} are not those it was made from",
-                    capture.name
-                ),
-                "name that capture, or solve again",
-            ));
+            let problem = format!(
+                "the mesh, the cameras or the photographs of {} are not those it was made from",
+                capture.name
+            );
+            let place = format!("{}: capture.hash", self.path.display());
+            let remedy = "name that capture, or solve again";
+            return Err(Error::new(place, problem, remedy));
         }
         self.estimate_by_name(capture)
     }
@@ -126,11 +125,9 @@ impl Saved {
 
 fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T> {
     if !path.exists() {
-        return Err(Error::file(
-            path,
-            "there are no results here",
-            "name a folder that relit solve wrote",
-        ));
+        let problem = "there are no results here";
+        let remedy = "name a folder that relit solve wrote";
+        return Err(Error::file(path, problem, remedy));
     }
     let bytes = read_whole(path)?;
     serde_json::from_slice(&bytes)

@@ -35,10 +35,10 @@ impl Staging {
         fs::create_dir_all(target).map_err(|error| Error::io(target, &error))?;
         let _lock = locked(target);
         remove_abandoned(target);
-        let temporary = tempfile::Builder::new()
+        let made = tempfile::Builder::new()
             .prefix(UNFINISHED)
-            .tempdir_in(target)
-            .map_err(|error| Error::io(target, &error))?;
+            .tempdir_in(target);
+        let temporary = made.map_err(|error| Error::io(target, &error))?;
         Ok(Self {
             target: target.to_owned(),
             _in_use: locked(temporary.path()),
@@ -71,10 +71,9 @@ impl Staging {
 
     /// Replaces the temporary path in an error by the target.
     pub fn named(&self, error: Error) -> Error {
-        let place = error.place.replace(
-            &self.temporary.path().display().to_string(),
-            &self.target.display().to_string(),
-        );
+        let [aside, target] =
+            [self.temporary.path(), &self.target].map(|p| p.display().to_string());
+        let place = error.place.replace(&aside, &target);
         Error { place, ..error }
     }
 
@@ -154,9 +153,8 @@ mod tests {
         let mut staging = start(folder.path());
         staging.write("views/000.txt", b"v").expect("writes");
         staging.write("a", b"new").expect("writes");
-        staging
-            .commit(|_| vec!["a".into(), "stale".into(), "never-there".into()])
-            .expect("moves");
+        let stale = ["a", "stale", "never-there"].map(PathBuf::from);
+        staging.commit(|_| stale.to_vec()).expect("moves");
         assert_eq!(read("a").as_deref(), Some("new"));
         assert_eq!(read("views/000.txt").as_deref(), Some("v"));
         assert_eq!(read("stale"), None);

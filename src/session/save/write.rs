@@ -58,18 +58,30 @@ pub fn write_edited(folder: &Path, results: &Results) -> Result<()> {
 
 /// Stages the estimate with its maps and checkpoint.
 fn stage_estimate(staging: &mut Staging, folder: &Path, results: &Results) -> Result<()> {
-    let (file, maps) = results.file(folder)?;
-    if let (Some(name), Some(bytes)) = (&file.maps, &maps) {
+    let file = stage_checkpoint(staging, folder, results, results.checkpoint.is_some())?;
+    staging.write(ESTIMATE, &json(ESTIMATE, &file)?)
+}
+
+/// Stages the maps and, if `wanted`, the checkpoint of an estimate. Returns the content of its `estimate.json`.
+fn stage_checkpoint(
+    staging: &mut Staging,
+    folder: &Path,
+    results: &Results,
+    wanted: bool,
+) -> Result<EstimateFile> {
+    let (estimate, maps) = EstimateFile::new(folder, results)?;
+    if let (Some(name), Some(bytes)) = (&estimate.maps, &maps) {
         staging.write(name, bytes)?;
     }
-    if results.checkpoint.is_some() {
-        let checkpoint = CheckpointFile {
-            estimate: file.clone(),
-            checkpoint: results.checkpoint.clone(),
-        };
-        staging.write(CHECKPOINT, &json(CHECKPOINT, &checkpoint)?)?;
+    let checkpoint = results.checkpoint.clone();
+    let file = CheckpointFile {
+        estimate,
+        checkpoint,
+    };
+    if wanted {
+        staging.write(CHECKPOINT, &json(CHECKPOINT, &file)?)?;
     }
-    staging.write(ESTIMATE, &json(ESTIMATE, &file)?)
+    Ok(file.estimate)
 }
 
 /// Writes the scene and the pictures of an estimate that is already written, and what `extra` adds.
@@ -104,16 +116,8 @@ fn write_shown(
 /// The folder cannot be written.
 pub fn write_checkpoint(folder: &Path, results: &Results) -> Result<()> {
     let mut staging = Staging::new(folder, &results.capture_id())?;
-    let (estimate, maps) = results.file(folder)?;
-    if let (Some(name), Some(bytes)) = (&estimate.maps, &maps) {
-        staging.write(name, bytes)?;
-    }
-    let own_maps = estimate.maps.clone().map(PathBuf::from);
-    let checkpoint = CheckpointFile {
-        estimate,
-        checkpoint: results.checkpoint.clone(),
-    };
-    staging.write(CHECKPOINT, &json(CHECKPOINT, &checkpoint)?)?;
+    let estimate = stage_checkpoint(&mut staging, folder, results, true)?;
+    let own_maps = estimate.maps.map(PathBuf::from);
     // Remove the maps of the previous checkpoint, unless finished results use them.
     staging.commit(|folder| {
         let mut stale = earlier_maps(folder);
@@ -128,19 +132,6 @@ pub fn write_checkpoint(folder: &Path, results: &Results) -> Result<()> {
     })
 }
 
-impl Results {
-    fn file(&self, folder: &Path) -> Result<(EstimateFile, Option<Vec<u8>>)> {
-        EstimateFile::new(
-            folder,
-            &self.capture,
-            &self.settings,
-            &self.estimate,
-            &self.edits,
-            self.stopped_because,
-        )
-    }
-}
-
 /// The course of a solve as a table, in order of time: losses in the fit and on held-out pixels where they were measured, and after
 /// each iteration the relative residual of the fit, the relative error that the estimate reports, and the number of unknowns.
 fn losses(progress: &Progress) -> Table {
@@ -153,23 +144,21 @@ fn losses(progress: &Progress) -> Table {
         "stderr",
         "unknowns",
     ]);
-    let cell = |value: Option<f64>| value.map_or(Cell::Empty, Cell::from);
     use Cell::Empty;
     let measured = progress.losses.iter().map(|p| {
-        let values = [cell(p.train), cell(p.held_out), Empty, Empty, Empty];
+        let values = [p.train.into(), p.held_out.into(), Empty, Empty, Empty];
         (p.seconds, p.iteration, values)
     });
     let fitted = progress.fits.iter().map(|p| {
-        let (residual, unknowns) = (Cell::from(p.residual), Cell::from(p.unknowns));
-        let values = [Empty, Empty, residual, cell(p.stderr), unknowns];
+        let (residual, stderr) = (p.residual.into(), p.stderr.into());
+        let values = [Empty, Empty, residual, stderr, p.unknowns.into()];
         (p.seconds, p.iteration, values)
     });
-    let mut rows: Vec<_> = measured.chain(fitted).collect();
+    let mut rows: Vec<(f64, u64, [Cell; 5])> = measured.chain(fitted).collect();
     rows.sort_by(|a, b| a.0.total_cmp(&b.0));
     for (seconds, iteration, values) in rows {
-        let mut row = vec![Cell::from(seconds), Cell::from(iteration)];
-        row.extend(values);
-        table.row(&row);
+        let time: [Cell; 2] = [seconds.into(), iteration.into()];
+        table.row(&[&time[..], &values].concat());
     }
     table
 }

@@ -21,34 +21,30 @@ impl Hits {
     /// Casts one ray per pixel.
     pub fn new(scene: &Scene, camera: &Camera) -> Self {
         let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
-        let hits = (0..width as usize * height as usize)
-            .into_par_iter()
-            .map(|pixel| {
-                let (x, y) = (pixel % width as usize, pixel / width as usize);
-                scene.intersect(&camera.ray(Vec2::new(x as f32 + 0.5, y as f32 + 0.5)))
-            })
-            .collect();
+        let nearest = |pixel: usize| {
+            let (x, y) = (pixel % width as usize, pixel / width as usize);
+            scene.intersect(&camera.ray(Vec2::new(x as f32, y as f32) + 0.5))
+        };
+        let pixels = (0..width as usize * height as usize).into_par_iter();
         Self {
             width,
             height,
-            hits,
+            hits: pixels.map(nearest).collect(),
         }
     }
 
     /// Object index of each pixel; `u32::MAX` where the ray leaves the mesh.
     pub fn objects(&self, scene: &Scene) -> Vec<u32> {
-        self.hits
-            .iter()
-            .map(|hit| hit.map_or(u32::MAX, |h| scene.object_of[h.triangle as usize]))
-            .collect()
+        let object = |hit: &Hit| scene.object_of[hit.triangle as usize];
+        let object = |hit: &Option<Hit>| hit.as_ref().map_or(u32::MAX, object);
+        self.hits.iter().map(object).collect()
     }
 
     /// Diffuse reflectance; black where the ray leaves the mesh.
     pub fn albedo(&self, scene: &Scene, materials: &[Material]) -> Picture {
         self.paint(scene, |object, hit| {
-            materials
-                .get(object)
-                .map_or(Vec3::ZERO, |m| m.albedo_at(hit))
+            let material = materials.get(object);
+            material.map_or(Vec3::ZERO, |m| m.albedo_at(hit))
         })
     }
 
@@ -97,19 +93,12 @@ impl Hits {
     }
 
     fn paint(&self, scene: &Scene, color: impl Fn(usize, &Hit) -> Vec3 + Sync) -> Picture {
-        let pixels = self
-            .hits
-            .par_iter()
-            .map(|hit| {
-                hit.as_ref().map_or(Vec3::ZERO, |hit| {
-                    color(scene.object_of[hit.triangle as usize] as usize, hit)
-                })
-            })
-            .collect();
+        let color = |hit: &Hit| color(scene.object_of[hit.triangle as usize] as usize, hit);
+        let hits = self.hits.par_iter();
         Picture {
             width: self.width,
             height: self.height,
-            pixels,
+            pixels: (hits.map(|hit| hit.as_ref().map_or(Vec3::ZERO, color))).collect(),
         }
     }
 }

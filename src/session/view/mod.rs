@@ -46,10 +46,8 @@ impl Views {
 
     /// Drops all pictures when another capture is opened. A request for a frame is kept.
     pub fn reset(&mut self) {
-        let request = self
-            .request
-            .take()
-            .filter(|r| matches!(r.camera, ViewCamera::Frame(_)));
+        let is_frame = |r: &ViewRequest| matches!(r.camera, ViewCamera::Frame(_));
+        let request = self.request.take().filter(is_frame);
         *self = Self {
             changed: request.is_some(),
             request,
@@ -105,9 +103,8 @@ impl Views {
 
     /// Switches to a new estimate if it is visibly different and the last one has been shown for long enough.
     fn follow(&mut self, estimate: &Arc<Estimate>, now: Instant) {
-        let rested = self
-            .checked
-            .is_none_or(|at| (now - at).as_secs_f32() >= CHECK_INTERVAL);
+        let is_old = |at: Instant| (now - at).as_secs_f32() >= CHECK_INTERVAL;
+        let rested = self.checked.is_none_or(is_old);
         if let Some(target) = self.target.as_mut().filter(|_| rested) {
             self.checked = Some(now);
             target.follow(estimate);

@@ -23,7 +23,8 @@ const MAX_EARLIER_SAMPLES: f64 = 3.0;
 pub struct Progressive {
     width: usize,
     height: usize,
-    split: Option<Arc<Split>>,
+    /// The split into layers, if any.
+    pub split: Option<Arc<Split>>,
     /// Sums by rows, all layers of a pixel together.
     sums: Vec<DVec3>,
     /// Sums of every other pass, without a split: an independent half for estimating the noise.
@@ -59,11 +60,6 @@ impl Progressive {
             row: 0,
             rows_a_second: 0.0,
         }
-    }
-
-    /// The split into layers, if any.
-    pub fn split(&self) -> Option<&Arc<Split>> {
-        self.split.as_ref()
     }
 
     /// Layers per pixel.
@@ -173,10 +169,7 @@ impl Progressive {
         if self.half.is_empty() || self.half_weight <= 0.0 || rest <= 0.0 {
             return None;
         }
-        let one = self
-            .half
-            .iter()
-            .map(|sum| (*sum / self.half_weight).as_vec3());
+        let one = (self.half.iter()).map(|sum| (*sum / self.half_weight).as_vec3());
         let other = self.sums.iter().zip(&self.half);
         let other = other.map(|(sum, half)| ((*sum - *half) / rest).as_vec3());
         Some([sized(camera, one.collect()), sized(camera, other.collect())])
@@ -185,9 +178,8 @@ impl Progressive {
     /// Mean radiance of each layer; call it only between passes.
     pub fn layer_pictures(&self, camera: &Camera) -> Vec<Picture> {
         let (count, scale) = (self.layers(), self.scale());
-        (0..count)
-            .map(|layer| sized(camera, layer_of(&self.sums, layer, count, scale)))
-            .collect()
+        let picture = |layer| sized(camera, layer_of(&self.sums, layer, count, scale));
+        (0..count).map(picture).collect()
     }
 
     fn scale(&self) -> f64 {

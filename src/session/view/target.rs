@@ -128,7 +128,7 @@ impl Target {
         self.guides = None;
         self.stale = true;
         // With other lamps the layers are others.
-        if let Some(split) = self.render.split() {
+        if let Some(split) = &self.render.split {
             let now = Split::new(&self.world);
             if now != **split {
                 self.render = Progressive::new(&self.camera, Some(Arc::new(now)));
@@ -153,10 +153,8 @@ impl Target {
             self.sketch(&coarse, options);
         } else if self.stale {
             self.stale = false;
-            let hits = self
-                .hits
-                .take()
-                .unwrap_or_else(|| Hits::new(&self.scene, &self.camera));
+            let hits = self.hits.take();
+            let hits = hits.unwrap_or_else(|| Hits::new(&self.scene, &self.camera));
             self.map(&hits, &self.camera.clone());
             self.objects = Some(Arc::new(hits.objects(&self.scene)));
             self.hits = Some(hits);
@@ -165,7 +163,7 @@ impl Target {
         } else {
             let samples = self.render.samples();
             // Denoising takes longer than a sample, so it is done when the samples have doubled.
-            let split = self.render.split().is_some();
+            let split = self.render.split.is_some();
             let doubled = samples.is_power_of_two() && samples > 1;
             if samples < self.hold || !(split || doubled) {
                 return None;
@@ -192,7 +190,7 @@ impl Target {
     fn sketch(&mut self, coarse: &Camera, options: &PathOptions) {
         let hits = Hits::new(&self.scene, coarse);
         self.map(&hits, coarse);
-        let mut render = Progressive::new(coarse, self.render.split().cloned());
+        let mut render = Progressive::new(coarse, self.render.split.clone());
         while !render.add(&self.world, coarse, options) {}
         self.layers = self.layers_of(&render, coarse);
         let picture = self.enlarged(self.exposed(render.picture(coarse), false));
@@ -201,7 +199,7 @@ impl Target {
 
     /// The layers of a render by lamp, in exposed light, at the size of the shown pictures.
     fn layers_of(&self, render: &Progressive, camera: &Camera) -> Option<Arc<LightLayers>> {
-        let split = render.split()?;
+        let split = render.split.as_ref()?;
         let pictures = render.layer_pictures(camera).into_iter();
         let shown = pictures.map(|picture| self.enlarged(self.exposed(picture, true)));
         Some(Arc::new(LightLayers {
@@ -242,10 +240,8 @@ impl Target {
     fn view(&self, sequence: u64) -> View {
         let [albedo, emission, stderr] = self.maps.clone();
         let (render, samples) = self.rendered.clone().unzip();
-        let error = render
-            .as_ref()
-            .zip(self.photograph.as_ref())
-            .map(|(render, photograph)| Arc::new(difference(render, photograph)));
+        let both = render.as_ref().zip(self.photograph.as_ref());
+        let error = both.map(|(render, taken)| Arc::new(difference(render, taken)));
         View {
             sequence,
             frame: self.frame,
@@ -264,11 +260,9 @@ impl Target {
 
 /// Render − photograph, signed.
 pub fn difference(render: &Picture, photograph: &Picture) -> Picture {
-    let pixels = (render.pixels.iter().zip(&photograph.pixels))
-        .map(|(r, p)| *r - *p)
-        .collect();
+    let pixels = render.pixels.iter().zip(&photograph.pixels);
     Picture {
-        pixels,
+        pixels: pixels.map(|(r, p)| *r - *p).collect(),
         ..*photograph
     }
 }

@@ -72,9 +72,9 @@ impl Worker {
             }
             Command::Regroup(wanted) => {
                 let go_on = self.solving && !self.paused;
-                let open = self.capture.as_ref();
-                if open
-                    .is_some_and(|c| c.hash == wanted.hash && c.options.objects != wanted.changes)
+                if let Some(open) = &self.capture
+                    && open.hash == wanted.hash
+                    && open.options.objects != wanted.changes
                 {
                     return Some(Next::Regroup(wanted, go_on));
                 }
@@ -180,14 +180,14 @@ impl Worker {
     fn thumbnail(&self, frame: usize) -> Option<(Picture, f32)> {
         let capture = self.capture.as_ref()?;
         let (_, taken) = capture.frame(frame).ok()?;
-        let composite = self.slot.pictures().insertion;
-        let composite = composite.filter(|shown| shown.frame == frame);
-        let picture =
-            composite.map_or_else(|| taken.picture(), |shown| shown.composite.as_ref().clone());
-        let (width, height) = (picture.width, picture.height);
-        let scale = (f64::from(THUMBNAIL) / f64::from(width.max(height).max(1))).min(1.0);
-        let [width, height] =
-            [width, height].map(|side| (f64::from(side) * scale).round().max(1.0) as u32);
+        let picture = match self.slot.pictures().insertion {
+            Some(shown) if shown.frame == frame => shown.composite.as_ref().clone(),
+            _ => taken.picture(),
+        };
+        let long_side = picture.width.max(picture.height).max(1);
+        let scale = (f64::from(THUMBNAIL) / f64::from(long_side)).min(1.0);
+        let scaled = |side: u32| (f64::from(side) * scale).round().max(1.0) as u32;
+        let [width, height] = [picture.width, picture.height].map(scaled);
         let small = box_filter(&picture, width, height);
         let exposure = shown_at(taken.saturation, &small.pixels);
         Some((small, exposure))
@@ -195,8 +195,7 @@ impl Worker {
 
     fn save(&mut self, folder: &Path) {
         let Some(results) = self.results() else {
-            self.say(Level::Error, "save: nothing is open; open a capture first");
-            return;
+            return self.say(Level::Error, "save: nothing is open; open a capture first");
         };
         match save::write(folder, &results) {
             Ok(()) => self.say(Level::Info, format!("saved to {}", folder.display())),
@@ -206,11 +205,8 @@ impl Worker {
 
     fn export(&mut self, request: &ExportRequest) {
         let Some(capture) = self.capture.clone() else {
-            self.say(
-                Level::Error,
-                "export: nothing is open; open a capture first",
-            );
-            return;
+            let message = "export: nothing is open; open a capture first";
+            return self.say(Level::Error, message);
         };
         let path = &request.path;
         let estimate = self.edited();
@@ -229,11 +225,8 @@ impl Worker {
         let view = self.slot.latest().view.clone();
         let layers = view.and_then(|view| view.layers.clone());
         let Some((capture, layers)) = self.capture.clone().zip(layers) else {
-            self.say(
-                Level::Error,
-                "layers: none are traced yet; wait for the first picture",
-            );
-            return;
+            let message = "layers: none are traced yet; wait for the first picture";
+            return self.say(Level::Error, message);
         };
         let pictures = (layers.layers.iter()).map(|(source, picture)| (*source, &**picture));
         if let Err(error) = light_layers::write(path, &capture.scene, pictures) {

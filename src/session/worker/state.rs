@@ -172,6 +172,7 @@ impl Worker {
         self.published = Instant::now();
         let (requests, solving) = (&self.requests, self.solving && !self.paused);
         requests.follow(&self.estimate, &self.settings, solving);
+        let seconds_left = self.rates.seconds_left(&self.progress, &self.settings);
         self.slot.put(Snapshot {
             phase: self.phase.clone(),
             capture: self.capture.clone(),
@@ -179,10 +180,7 @@ impl Worker {
             progress: self.progress.clone(),
             iterations_per_second: self.rates.iterations(),
             rays_per_second: self.rates.rays(),
-            seconds_left: self
-                .solving
-                .then(|| self.rates.seconds_left(&self.progress, &self.settings))
-                .flatten(),
+            seconds_left: seconds_left.filter(|_| self.solving),
             estimate: self.estimate.clone(),
             edits: self.edits.clone(),
             regroupings: self.regroupings,

@@ -49,11 +49,9 @@ impl Worker {
     fn contain(&mut self, payload: &(dyn Any + Send)) {
         (self.solving, self.paused, self.step) = (false, false, false);
         self.phase = Phase::Failed;
-        self.fail(&Error::new(
-            "worker",
-            format!("internal error: {}", panic_message(payload)),
-            "the last estimate is kept: save it, then reset",
-        ));
+        let problem = format!("internal error: {}", panic_message(payload));
+        let remedy = "the last estimate is kept: save it, then reset";
+        self.fail(&Error::new("worker", problem, remedy));
     }
 
     /// Serves commands until there is something else to do.
@@ -146,6 +144,11 @@ impl Worker {
             self.set_edits(edits);
         }
         self.phase = before;
+        self.solve_if(go_on)
+    }
+
+    /// Continues the solve if `go_on`.
+    fn solve_if(&self, go_on: bool) -> Next {
         match go_on {
             true => Next::Solve(self.checkpoint.clone()),
             false => Next::Wait,
@@ -187,10 +190,7 @@ impl Worker {
         }
         self.phase = before;
         self.touch();
-        match go_on {
-            true => Next::Solve(self.checkpoint.clone()),
-            false => Next::Wait,
-        }
+        self.solve_if(go_on)
     }
 
     /// Reads the open capture with other options; inserted objects stay in place. False on failure.
@@ -234,17 +234,16 @@ impl Worker {
         }
         let settings = self.settings.clone();
         let paused = self.paused;
-        self.phase = if paused {
-            Phase::Paused
-        } else {
-            Phase::Solving
+        self.phase = match paused {
+            true => Phase::Paused,
+            false => Phase::Solving,
         };
         self.solving = true;
         self.publish(true);
 
         // The observer borrows the worker, so the solver is moved out for the call.
-        let mut solver =
-            std::mem::replace(&mut self.backend.solve, Box::new(crate::inverse::solve));
+        let solver = &mut self.backend.solve;
+        let mut solver = std::mem::replace(solver, Box::new(crate::inverse::solve));
         let mut steering = Steering::new(self);
         let outcome = catch_unwind(AssertUnwindSafe(|| {
             solver(&problem, &settings, checkpoint, &mut steering)
@@ -263,9 +262,8 @@ impl Worker {
                 self.phase = match solution.termination {
                     Termination::Cancelled if !matches!(next, Next::Wait) => held,
                     ended => {
-                        let seconds = self.progress.seconds;
-                        let message =
-                            format!("the solve ended after {seconds:.1} s: {}", ended.word());
+                        let (seconds, why) = (self.progress.seconds, ended.word());
+                        let message = format!("the solve ended after {seconds:.1} s: {why}");
                         self.say(Level::Info, message);
                         Phase::Finished(ended)
                     }
