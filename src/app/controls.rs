@@ -1,6 +1,6 @@
 //! Controls that several panes share, each with a name for those who do not see it.
 
-use egui::{Button, ComboBox, DragValue, Key, Response, Role, TextEdit, Ui, WidgetInfo};
+use egui::{Button, ComboBox, DragValue, Key, Response, Role, TextEdit, Ui, Widget, WidgetInfo};
 use glam::{DVec3, Vec3};
 
 /// A response with a name that is read out.
@@ -13,6 +13,12 @@ pub fn named(response: Response, role: Role, name: &str) -> Response {
 pub fn switched(response: Response, role: Role, on: bool, name: &str) -> Response {
     response.widget_info(|| WidgetInfo::selected(role, true, on, name));
     response
+}
+
+/// A control with a label before it.
+pub fn labelled(ui: &mut Ui, label: &str, control: impl Widget) -> Response {
+    let label = ui.label(label);
+    ui.add(control).labelled_by(label.id)
 }
 
 /// Three numbers for a point of the capture, of which one is dragged by `speed` a point of the screen; true when changed.
@@ -47,9 +53,8 @@ pub fn path_field(
     hint: &str,
     width: f32,
 ) -> (Response, bool) {
-    let label = ui.label(label);
     let field = TextEdit::singleline(path).hint_text(hint);
-    let response = ui.add(field.desired_width(width)).labelled_by(label.id);
+    let response = labelled(ui, label, field.desired_width(width));
     let enter = ui.input(|input| input.key_pressed(Key::Enter));
     let entered = response.lost_focus() && enter;
     (response, entered)

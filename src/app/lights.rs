@@ -133,15 +133,10 @@ impl Document {
 pub fn place(scene: &Scene, object: u32, camera: &Camera) -> Option<String> {
     let triangles = &scene.objects.get(object as usize)?.triangles;
     let stride = triangles.len().div_ceil(SAMPLED).max(1);
-    let (mut sum, mut count) = (Vec3::ZERO, 0.0);
-    for &triangle in triangles.iter().step_by(stride) {
-        let corners = scene.triangles.get(triangle as usize)?;
-        sum += (corners.iter())
-            .filter_map(|&corner| scene.positions.get(corner as usize))
-            .sum::<Vec3>();
-        count += 3.0;
-    }
-    let middle = sum / count;
+    let sampled = triangles.iter().step_by(stride);
+    let corners = 3.0 * sampled.len() as f32;
+    let sums = sampled.map(|&triangle| scene.corners(triangle).iter().sum::<Vec3>());
+    let middle = sums.sum::<Vec3>() / corners;
     let k = &camera.intrinsics;
     let pixel = camera.project(middle);
     let part = |at: f32, whole: u32, words: [&'static str; 3]| {

@@ -95,7 +95,9 @@ fn window(
         Start::Capture(source, _) => source,
         Start::Results(folder) => Source::Folder(folder),
     });
-    Ok(Window::new(cc, app, kept).paced(pace))
+    let mut window = Window::new(cc, app, kept);
+    window.pace = Some(pace);
+    Ok(window)
 }
 
 /// The reason in one line.

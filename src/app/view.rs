@@ -10,6 +10,7 @@ use crate::app::picture::drawn::{Derived, Drawn};
 use crate::app::picture::look::Look;
 use crate::app::picture::needed::Needed;
 use crate::app::picture::quantity::Quantity;
+use crate::app::request::Requests;
 use crate::app::selection::Selection;
 use crate::app::shell::Shell;
 use crate::app::shown::Shown;
@@ -41,6 +42,16 @@ pub struct ViewState {
     pub shell: Shell,
     /// What is asked of the layout.
     pub layout: LayoutRequest,
+}
+
+/// What panes of pictures borrow.
+pub struct Parts<'a> {
+    /// What is shown.
+    pub document: &'a Document,
+    /// How it is shown.
+    pub view: &'a mut ViewState,
+    /// What the pane asks for.
+    pub requests: &'a mut Requests,
 }
 
 /// How the panes of words and numbers are shown.

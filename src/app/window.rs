@@ -11,6 +11,7 @@ use crate::app::shell::{
     alignment, files, keys, menu, palette, sessions, start, status, thumbnails, toolbar,
 };
 use crate::app::state::App;
+use crate::app::view::Parts;
 use crate::app::{action, model, picture, theme};
 use crate::say;
 use egui::{CentralPanel, Frame, Margin, Panel, Ui};
@@ -28,7 +29,8 @@ pub struct Window {
     workspace: Workspace,
     kept: Option<PathBuf>,
     saved: Preferences,
-    pace: Option<Arc<Pace>>,
+    /// What is told of every pass.
+    pub pace: Option<Arc<Pace>>,
 }
 
 impl Window {
@@ -50,14 +52,6 @@ impl Window {
             kept,
             saved,
             pace: None,
-        }
-    }
-
-    /// The same, telling `pace` of every pass.
-    pub fn paced(self, pace: Arc<Pace>) -> Self {
-        Self {
-            pace: Some(pace),
-            ..self
         }
     }
 
@@ -197,12 +191,20 @@ impl eframe::App for Window {
         self.app.perform_all(&mut requests, &ctx);
         self.panes(ui, &mut requests);
         let (document, view) = (&self.app.document, &mut self.app.view);
-        files::show(&ctx, document, view, &mut requests);
+        let requests = &mut requests;
+        files::show(
+            &ctx,
+            &mut Parts {
+                document,
+                view,
+                requests,
+            },
+        );
         keys::show(&ctx, &mut view.shell.keys);
-        palette::show(&ctx, &mut view.shell.palette, &mut requests);
+        palette::show(&ctx, &mut view.shell.palette, requests);
         self.app.jobs.notices.show(&ctx);
-        alignment::show(&ctx, document, &mut requests);
-        self.app.perform_all(&mut requests, &ctx);
+        alignment::show(&ctx, document, requests);
+        self.app.perform_all(requests, &ctx);
         // A drag is saved once it has ended.
         if !ctx.input(|input| input.pointer.any_down()) {
             self.save();

@@ -9,16 +9,19 @@ use crate::scene::geometry::Ray;
 use egui::{Color32, Modifiers, Painter, Pos2, Rect, Stroke, StrokeKind, vec2};
 use glam::{DVec3, Quat, Vec3};
 
-/// What can be dragged, by the object's index.
+/// What the pointer does to an object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Handle {
-    /// The one at its base, which moves it.
-    Move(usize),
-    /// The one beside it, which rotates it.
-    Rotate(usize),
-    /// The one above it, which scales it.
-    Scale(usize),
+pub enum Kind {
+    /// Moves it; its handle is at its base.
+    Move,
+    /// Rotates it; its handle is beside it.
+    Rotate,
+    /// Scales it; its handle is above it.
+    Scale,
 }
+
+/// What can be dragged: the object's index, and what the handle does to it.
+pub type Handle = (usize, Kind);
 
 /// What a foot is moved along.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -43,14 +46,6 @@ impl Along {
     }
 }
 
-impl Handle {
-    fn index(self) -> usize {
-        match self {
-            Self::Move(index) | Self::Rotate(index) | Self::Scale(index) => index,
-        }
-    }
-}
-
 /// Least and greatest scale of an object.
 pub const SCALES: (f64, f64) = (1e-6, 1e6);
 
@@ -67,14 +62,16 @@ impl Insertions {
         let mut handles = Vec::new();
         let shown = self.objects.iter().enumerate().filter(|(_, o)| !o.hidden);
         for (index, object) in shown {
-            if self.chosen == Some(index) {
-                let handle = self.rotate_handle(object, scene).and_then(&project);
-                let top = self.scale_handle(object, scene).and_then(&project);
-                handles.extend(handle.map(|at| (Handle::Rotate(index), at)));
-                handles.extend(top.map(|at| (Handle::Scale(index), at)));
+            for kind in [Kind::Rotate, Kind::Scale, Kind::Move] {
+                let place = match kind {
+                    Kind::Move => foot(object, scene),
+                    _ if self.chosen != Some(index) => None,
+                    Kind::Rotate => self.rotate_handle(object, scene),
+                    Kind::Scale => self.scale_handle(object, scene),
+                };
+                let shown = place.and_then(&project);
+                handles.extend(shown.map(|at| ((index, kind), at)));
             }
-            let foot = foot(object, scene).and_then(&project);
-            handles.extend(foot.map(|at| (Handle::Move(index), at)));
         }
         handles
     }
@@ -117,17 +114,21 @@ impl Insertions {
         surface: Option<DVec3>,
         along: Along,
     ) -> Option<(usize, Placement)> {
-        let mut object = self.objects.get(handle.index())?.clone();
-        match handle {
-            Handle::Move(_) => match along {
-                Along::Surfaces => object.at = surface.or(object.at),
-                Along::Up => object.at = raised(&object, scene, ray).or(object.at),
-                Along::Level => object.at = levelled(&object, scene, ray).or(object.at),
-            },
-            Handle::Rotate(_) => object.rotate = self.turned(&object, scene, ray)?,
-            Handle::Scale(_) => object.scale = self.resized(&object, scene, ray)?,
+        let (index, kind) = handle;
+        let mut object = self.objects.get(index)?.clone();
+        match kind {
+            Kind::Move => {
+                let to = match along {
+                    Along::Surfaces => surface,
+                    Along::Up => raised(&object, scene, ray),
+                    Along::Level => levelled(&object, scene, ray),
+                };
+                object.at = to.or(object.at);
+            }
+            Kind::Rotate => object.rotate = self.turned(&object, scene, ray)?,
+            Kind::Scale => object.scale = self.resized(&object, scene, ray)?,
         }
-        Some((handle.index(), object))
+        Some((index, object))
     }
 
     /// The scale that brings the handle above an object to where the ray passes the axis through its foot.
@@ -166,22 +167,22 @@ impl Insertions {
             draw_box(painter, &corners, &project, tokens.inserted, 1.5);
         }
         let handles = self.handles(scene, project);
-        for (handle, at) in &handles {
-            match handle {
-                Handle::Move(index) => {
+        for ((index, kind), at) in &handles {
+            match kind {
+                Kind::Move => {
                     let chosen = self.chosen == Some(*index);
                     let radius = if chosen { 5.0 } else { 3.5 };
                     let outline = Stroke::new(1.0, Color32::BLACK);
                     painter.circle(*at, radius, tokens.inserted, outline);
                 }
-                Handle::Rotate(index) => {
-                    let foot = |(other, _): &&(Handle, Pos2)| *other == Handle::Move(*index);
+                Kind::Rotate => {
+                    let foot = |(other, _): &&(Handle, Pos2)| *other == (*index, Kind::Move);
                     if let Some((_, foot)) = handles.iter().find(foot) {
                         painter.line_segment([*foot, *at], Stroke::new(1.5, tokens.inserted));
                     }
                     painter.circle(*at, 4.5, Color32::BLACK, Stroke::new(2.0, tokens.inserted));
                 }
-                Handle::Scale(_) => {
+                Kind::Scale => {
                     let square = Rect::from_center_size(*at, vec2(9.0, 9.0));
                     let (stroke, inside) = (Stroke::new(2.0, tokens.inserted), StrokeKind::Inside);
                     painter.rect(square, 0.0, Color32::BLACK, stroke, inside);
@@ -230,7 +231,7 @@ pub(super) fn three_digits(value: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{Along, Handle};
+    use super::{Along, Kind};
     use crate::app::insertion::Insertions;
     use crate::app::model::tests::scene;
     use crate::scene::geometry::Ray;
@@ -280,7 +281,7 @@ mod tests {
         let ray = |from: DVec3, to: DVec3| Ray::new(local(from), (to - from).as_vec3());
 
         // The handle stands at 0.2 + 0.08; at twice that height the object is twice as large.
-        let size = Handle::Scale(0);
+        let size = (0, Kind::Scale);
         let aim = ray(DVec3::new(0.3, 0.5, 3.0), DVec3::new(0.0, 0.56, 0.0));
         let dragged = insertions.dragged(size, &scene, &aim, None, Along::Surfaces);
         insertions.objects[0] = dragged.expect("a size").1;
@@ -299,7 +300,7 @@ mod tests {
             (2.0, level, Along::Surfaces, DVec3::X),
         ] {
             let aim = ray(DVec3::new(0.0, height, 3.0), to);
-            let foot = Handle::Move(0);
+            let foot = (0, Kind::Move);
             let dragged = insertions.dragged(foot, &scene, &aim, Some(DVec3::X), along);
             insertions.objects[0] = dragged.expect("a place").1;
             let at = insertions.objects[0].at.expect("a place");

@@ -10,9 +10,6 @@ use glam::{DVec3, Vec3};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// An object's file, and its shape or why it cannot be read.
-pub type Read = (PathBuf, std::result::Result<(), String>);
-
 /// What is known of an object's file.
 enum Shape {
     Reading(Task<(), Outline>),
@@ -24,8 +21,12 @@ enum Shape {
 pub struct Models(HashMap<PathBuf, Shape>);
 
 impl Models {
-    /// Starts reading what is not known yet; gives the files that have been read since the last call.
-    pub fn update(&mut self, ctx: &egui::Context, objects: &[Placement]) -> Vec<Read> {
+    /// Starts reading what is not known yet; gives the files that have been read since the last call, or why they cannot be.
+    pub fn update(
+        &mut self,
+        ctx: &egui::Context,
+        objects: &[Placement],
+    ) -> Vec<(PathBuf, Result<(), String>)> {
         for object in objects {
             self.ask(ctx, &object.file);
         }
@@ -51,11 +52,10 @@ impl Models {
         if let Some(known) = self.0.get(file) {
             return matches!(known, Shape::Read(_));
         }
-        let (ctx, path) = (ctx.clone(), file.to_owned());
-        let wake = move || ctx.request_repaint();
+        let path = file.to_owned();
         let read = move |_: &Progress<()>| Ok(Outline::new(&ObjectModel::read(&path)?));
         // Without a thread the object has no box.
-        if let Ok(task) = Task::begin("object", wake, read) {
+        if let Ok(task) = Task::begin("object", ctx, read) {
             self.0.insert(file.to_owned(), Shape::Reading(task));
         }
         false
@@ -81,8 +81,7 @@ impl Models {
 
     /// A power of ten that makes an object at most a third of the scene, where it is larger than that as modelled.
     pub fn fitting_scale(&self, file: &Path, scene: &Scene) -> Option<f64> {
-        let (low, high) = self.shape(file)?.bounds;
-        let size = (high - low).max_element();
+        let size = self.size(file)?.max_element();
         let diameter = f64::from(scene.diameter);
         if size <= diameter || !size.is_finite() {
             return None;

@@ -86,9 +86,8 @@ impl ModelView {
 
 /// Cuts up the mesh and colours it by the photographs, on a thread; wakes the window as parts are ready.
 fn make(ctx: &egui::Context, capture: &Arc<OpenCapture>) -> Option<Task<Made, ()>> {
-    let (ctx, capture) = (ctx.clone(), capture.clone());
-    let wake = move || ctx.request_repaint();
-    let made = Task::begin("3D view", wake, move |progress| {
+    let capture = capture.clone();
+    let made = Task::begin("3D view", ctx, move |progress| {
         let surface = Arc::new(Surface::new(&capture.scene));
         progress.show((surface.clone(), Vec::new()));
         if !progress.is_cancelled() {

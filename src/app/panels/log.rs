@@ -1,6 +1,6 @@
 //! Everything that happened, the newest at the end.
 
-use crate::app::shell::notices::{Notices, level_color, level_word};
+use crate::app::shell::notices::{Notices, level_color};
 use egui::{Label, ScrollArea, Ui};
 
 /// Draws the pane.
@@ -15,7 +15,8 @@ pub fn pane(ui: &mut Ui, notices: &Notices) {
         .show(ui, |ui| {
             for event in &notices.log {
                 ui.horizontal_top(|ui| {
-                    ui.colored_label(level_color(ui, event.level), level_word(event.level));
+                    let color = level_color(ui, event.level);
+                    ui.colored_label(color, format!("{:?}", event.level));
                     ui.add(Label::new(&event.message).wrap());
                 });
             }

@@ -2,7 +2,7 @@
 
 use crate::app::action::Action;
 use crate::app::choices::choices;
-use crate::app::controls::{named, switched};
+use crate::app::controls::{labelled, named, switched};
 use crate::app::describe::described;
 use crate::app::document::Document;
 use crate::app::number::{number, triple};
@@ -11,6 +11,7 @@ use crate::app::selection::Selection;
 use crate::app::theme;
 use crate::inverse::estimate::ObjectEstimate;
 use crate::math::color::luminance;
+use crate::scene::Object;
 use egui::{
     Align, Button, Color32, Key, Label, RichText, Role, Sense, Shape, Stroke, StrokeKind, TextEdit,
     Ui, vec2,
@@ -75,17 +76,13 @@ impl ObjectsTable {
                 SortBy::Pixels => object.seen_pixels as f64,
             })
         };
+        // Equal ones stay in the capture's order.
         rows.sort_by(|&a, &b| {
-            let by_key = match self.sort {
+            let (a, b) = if self.descending { (b, a) } else { (a, b) };
+            match self.sort {
                 SortBy::Name => names[a].cmp(names[b]),
                 _ => key(a).total_cmp(&key(b)),
-            };
-            let by_key = match self.descending {
-                true => by_key.reverse(),
-                false => by_key,
-            };
-            // Equal ones stay in the capture's order.
-            by_key.then(a.cmp(&b))
+            }
         });
         rows
     }
@@ -95,16 +92,12 @@ impl ObjectsTable {
 pub fn pane(
     ui: &mut Ui,
     document: &Document,
+    objects: &[Object],
     selection: &Selection,
     table: &mut ObjectsTable,
     requests: &mut Requests,
 ) {
-    let Some(capture) = document.capture() else {
-        ui.weak(document.nothing_open());
-        return;
-    };
     let (estimate, unit) = (&document.estimate, document.radiance_unit());
-    let objects = &capture.scene.objects;
     let area: f64 = objects.iter().map(|object| object.area).sum();
     let albedo = |index: usize| {
         let found = estimate.objects.get(index);
@@ -116,9 +109,8 @@ pub fn pane(
         .collect();
     let names: Vec<&str> = described.iter().map(String::as_str).collect();
     ui.horizontal(|ui| {
-        let label = ui.label("Filter");
-        ui.add(TextEdit::singleline(&mut table.filter).desired_width(120.0))
-            .labelled_by(label.id);
+        let filter = TextEdit::singleline(&mut table.filter);
+        labelled(ui, "Filter", filter.desired_width(120.0));
         ui.weak(format!("{} objects", names.len()));
         let common = document.estimate.common_error * 100.0;
         if common > 0.0 {
@@ -127,7 +119,18 @@ pub fn pane(
                 .on_hover_text(help);
         }
     });
-    regroup(ui, document, selection, table, requests);
+    ui.horizontal_wrapped(|ui| {
+        for action in [Action::JoinObjects, Action::CutOut] {
+            let help = format!("{}. The solve then starts over.", action.help());
+            requests.button_with_help(ui, action, Button::new(action.text()), &help);
+        }
+        let named = |object: u32| Some((object, &objects.get(object as usize)?.name));
+        if !document.can_regroup() {
+            ui.weak("Reading the mesh again…");
+        } else if let Some((object, name)) = selection.object.and_then(named) {
+            rename(ui, table, object, name, requests);
+        }
+    });
     let rows = table.rows(&names, &estimate.objects);
     let place = |object: u32| rows.iter().position(|&row| row == object as usize);
     let selected_row = selection.object.and_then(place);
@@ -176,37 +179,14 @@ pub fn pane(
     }
 }
 
-/// Buttons and a field that change which faces are one object, and its name.
-fn regroup(
-    ui: &mut Ui,
-    document: &Document,
-    selection: &Selection,
-    table: &mut ObjectsTable,
-    requests: &mut Requests,
-) {
-    ui.horizontal_wrapped(|ui| {
-        for action in [Action::JoinObjects, Action::CutOut] {
-            let help = format!("{}. The solve then starts over.", action.help());
-            requests.button_with_help(ui, action, Button::new(action.text()), &help);
-        }
-        let name = |object: u32| document.capture()?.scene.objects.get(object as usize);
-        if !document.can_regroup() {
-            ui.weak("Reading the mesh again…");
-        } else if let Some((object, named)) = (selection.object).and_then(|o| Some((o, name(o)?))) {
-            rename(ui, table, object, &named.name, requests);
-        }
-    });
-}
-
 /// The name of an object, to be typed over.
 fn rename(ui: &mut Ui, table: &mut ObjectsTable, object: u32, name: &str, requests: &mut Requests) {
     let mut typed = match table.renamed.take() {
         Some((known, typed)) if known == object => typed,
         _ => name.to_owned(),
     };
-    let label = ui.label("Name");
     let field = TextEdit::singleline(&mut typed).desired_width(110.0);
-    let response = ui.add(field).labelled_by(label.id);
+    let response = labelled(ui, "Name", field);
     if std::mem::take(&mut table.naming) {
         response.request_focus();
     }

@@ -43,33 +43,32 @@ impl App {
             Needs::Capture => open,
             Needs::CurrentObjects => open && document.objects_are_current(),
         };
-        ready && self.is_possible(action)
-    }
-
-    /// Whether an action that has what it needs would do something.
-    fn is_possible(&self, action: Action) -> bool {
-        let (document, selection) = (&self.document, &self.view.selection);
-        match action {
-            Action::Undo => document.history.can_undo(),
-            Action::Redo => document.history.can_redo(),
-            Action::SwitchLamp => self.edited_object().is_some_and(|o| document.is_lamp(o)),
-            Action::ResetMaterial => (self.edited_object())
-                .is_some_and(|o| document.edits.object(o) != ObjectEdit::default()),
-            Action::JoinObjects => document.can_regroup() && selection.all().len() > 1,
-            Action::RenameObject => document.can_regroup() && selection.object.is_some(),
-            Action::CutOut => document.can_regroup(),
-            Action::SolveOn => !document.edits.known().is_empty(),
-            Action::ResetEdits => !document.edits.is_empty(),
-            Action::ResetLights => document.lights_are_changed(),
-            Action::Place | Action::Duplicate | Action::Delete => {
-                document.insertions.chosen.is_some()
+        // What it needs is there; now whether it would do something.
+        let selection = &self.view.selection;
+        ready
+            && match action {
+                Action::Undo => document.history.can_undo(),
+                Action::Redo => document.history.can_redo(),
+                Action::SwitchLamp => self.edited_object().is_some_and(|o| document.is_lamp(o)),
+                Action::ResetMaterial => (self.edited_object())
+                    .is_some_and(|o| document.edits.object(o) != ObjectEdit::default()),
+                Action::JoinObjects => document.can_regroup() && selection.all().len() > 1,
+                Action::RenameObject => document.can_regroup() && selection.object.is_some(),
+                Action::CutOut => document.can_regroup(),
+                Action::SolveOn => !document.edits.known().is_empty(),
+                Action::ResetEdits => !document.edits.is_empty(),
+                Action::ResetLights => document.lights_are_changed(),
+                Action::Place | Action::Duplicate | Action::Delete => {
+                    document.insertions.chosen.is_some()
+                }
+                Action::MeasureTrade => {
+                    self.jobs.measured.measuring.is_some() || self.can_measure()
+                }
+                Action::Finish => matches!(document.snapshot.phase, Phase::Solving | Phase::Paused),
+                Action::SavePhotographs => self.can_write_photographs(),
+                Action::CancelPhotographs => self.jobs.batch.is_some(),
+                _ => true,
             }
-            Action::MeasureTrade => self.jobs.measured.measuring.is_some() || self.can_measure(),
-            Action::Finish => matches!(document.snapshot.phase, Phase::Solving | Phase::Paused),
-            Action::SavePhotographs => self.can_write_photographs(),
-            Action::CancelPhotographs => self.jobs.batch.is_some(),
-            _ => true,
-        }
     }
 
     /// Does all that was asked.
@@ -102,7 +101,7 @@ impl App {
             Request::OpenPath(path) => self.open_path(&path, ctx),
             Request::Resume(folder) => self.resume(folder),
             Request::CancelImport => self.jobs.importing = None,
-            Request::Browse(ask) => self.browse(ask, ctx),
+            Request::Browse(ask) => self.jobs.dialogs.open(ask, ctx),
             Request::Insert(file) => self.insert(file),
             Request::Choose(index) => self.document.insertions.chosen = Some(index),
             Request::Place(index, to) => {
@@ -140,7 +139,7 @@ impl App {
             return;
         }
         match action {
-            Action::OpenFolder => self.browse(Ask::Capture, ctx),
+            Action::OpenFolder => self.jobs.dialogs.open(Ask::Capture, ctx),
             Action::OpenRoom => self.open(Source::BuiltInRoom),
             Action::Sessions => self.view.shell.sheet = Sheet::Sessions,
             Action::StartPage => self.view.shell.start.asked ^= true,
@@ -289,12 +288,6 @@ impl App {
         shell.palette = None;
         shell.sheet = Sheet::Closed;
         shell.start.asked = false;
-    }
-
-    /// Opens a file dialog.
-    fn browse(&mut self, ask: Ask, ctx: &Context) {
-        let ctx = ctx.clone();
-        self.jobs.dialogs.open(ask, move || ctx.request_repaint());
     }
 
     /// Shows the remembered theme.

@@ -22,6 +22,13 @@ pub struct Drawn {
     pub range: f32,
 }
 
+impl Drawn {
+    /// Width and height in pixels.
+    pub fn size(&self) -> [u32; 2] {
+        [self.picture.width, self.picture.height]
+    }
+}
+
 /// The objects that the pixels of a view show, for a picture of the same view in another size; made once for each view.
 #[derive(Debug, Default)]
 pub struct Resized(Option<(Indices, [u32; 2], Indices)>);

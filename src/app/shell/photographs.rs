@@ -1,12 +1,27 @@
 //! The sheet that writes photographs with objects in them and in changed light, and how far that is.
 
 use crate::app::action::Action;
-use crate::app::batch::Batch;
+use crate::app::controls::named;
 use crate::app::document::Document;
 use crate::app::request::{Request, Requests};
 use crate::app::shell::path::path_and_buttons;
 use crate::app::shell::sheet::Wanted;
-use egui::{Button, DragValue, ProgressBar, Ui};
+use crate::app::task::Task;
+use crate::session::photographs::{WriteProgress, Written};
+use egui::{Button, DragValue, ProgressBar, Role, Ui};
+use std::path::PathBuf;
+
+/// Photographs that are being written.
+pub struct Batch {
+    /// The folder that they are written into.
+    pub folder: PathBuf,
+    /// What it is at.
+    pub doing: Option<WriteProgress>,
+    /// How many photographs it is to write.
+    pub wanted: usize,
+    /// The work.
+    pub task: Task<WriteProgress, Written>,
+}
 
 /// Draws the sheet; true when it is to close.
 pub fn sheet(
@@ -55,8 +70,12 @@ pub fn progress(ui: &mut Ui, batch: &Batch, requests: &mut Requests) {
     let folder = format!("Writes into {}", batch.folder.display());
     ui.separator();
     // The button comes first, where it stays while the rest changes.
-    let cancel = Button::new("Cancel").small();
-    requests.named_button(ui, Action::CancelPhotographs, cancel);
+    let (action, cancel) = (Action::CancelPhotographs, Button::new("Cancel").small());
+    named(
+        requests.button(ui, action, cancel),
+        Role::Button,
+        action.text(),
+    );
     if let Some(doing) = batch.doing {
         let bar = ProgressBar::new(doing.fraction).desired_width(90.0);
         ui.add(bar.desired_height(8.0)).on_hover_text(&folder);

@@ -1,10 +1,9 @@
 //! The status bar: what the worker does, how fast, how long still, and with how much memory.
 
-use crate::app::batch::Batch;
 use crate::app::document::Document;
 use crate::app::number::number;
 use crate::app::request::Requests;
-use crate::app::shell::photographs;
+use crate::app::shell::photographs::{self, Batch};
 use crate::app::theme;
 use crate::inverse::solver::Termination;
 use crate::session::save::memory::resident_bytes;
@@ -28,18 +27,6 @@ impl Memory {
             self.looked_up = Some(Instant::now());
         }
         self.bytes
-    }
-}
-
-/// Word of a phase.
-fn phase_word(phase: &Phase) -> &'static str {
-    match phase {
-        Phase::Idle => "Idle",
-        Phase::Loading => "Loading",
-        Phase::Solving => "Solving",
-        Phase::Paused => "Paused",
-        Phase::Finished(why) => ending(*why),
-        Phase::Failed => "Failed",
     }
 }
 
@@ -73,8 +60,11 @@ pub fn bar(
         Phase::Finished(_) => tokens.good,
     };
     ui.horizontal_centered(|ui| {
-        let phase = RichText::new(phase_word(&snapshot.phase));
-        ui.label(phase.color(color).strong());
+        let phase = match &snapshot.phase {
+            Phase::Finished(why) => ending(*why).to_owned(),
+            phase => format!("{phase:?}"),
+        };
+        ui.label(RichText::new(phase).color(color).strong());
         let progress = &snapshot.progress;
         if document.is_running() {
             if let Some(fraction) = progress.fraction {

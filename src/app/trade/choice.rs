@@ -41,47 +41,40 @@ impl Stop {
 
 /// Round errors, each with the preset that reaches it first, and round seconds, each with the most exact preset by then.
 pub fn offers(trade: &Trade) -> Vec<Offer> {
-    let presets = || {
-        let all = trade.curves.iter().enumerate();
-        all.filter(|(_, curve)| curve.is_preset)
-    };
-    let errors = ERRORS.iter().filter_map(|&percent| {
-        let first = |curve: &Curve| {
+    let ends = trade.curves.iter().filter_map(|curve| curve.points.last());
+    let last = ends.map(|point| point.seconds).fold(0.0, f64::max);
+    let seconds = SECONDS.into_iter().filter(|&seconds| seconds <= last);
+    let stops = ERRORS.map(Stop::Error).into_iter();
+    let stops = stops.chain(seconds.map(Stop::Seconds));
+    stops.filter_map(|stop| offer(trade, stop)).collect()
+}
+
+/// The preset that is best at a stop.
+fn offer(trade: &Trade, stop: Stop) -> Option<Offer> {
+    // Seconds until a curve claims the error, or its error by then.
+    let value = |curve: &Curve| match stop {
+        Stop::Error(percent) => {
             let claims = |point: &&Point| point.reported.is_some_and(|e| e * 100.0 <= percent);
             curve.points.iter().find(claims).map(|point| point.seconds)
-        };
-        let reached = presets().filter_map(|(i, curve)| Some((i, first(curve)?)));
-        let (curve, seconds) = reached.min_by(|a, b| a.1.total_cmp(&b.1))?;
-        let name = &trade.curves[curve].name;
-        Some(Offer {
-            stop: Stop::Error(percent),
-            curve,
-            expected: format!("{name}: after {seconds:.1} s"),
-        })
-    });
-    let last = (trade.curves.iter())
-        .filter_map(|curve| curve.points.last())
-        .map(|point| point.seconds)
-        .fold(0.0, f64::max);
-    let seconds = SECONDS
-        .iter()
-        .filter(|&&s| s <= last)
-        .filter_map(|&seconds| {
-            let then = |curve: &Curve| {
-                let before = curve.points.iter().rev().find(|p| p.seconds <= seconds)?;
-                Some(before.error)
-            };
-            let there = presets().filter_map(|(i, curve)| Some((i, then(curve)?)));
-            let (curve, error) = there.min_by(|a, b| a.1.total_cmp(&b.1))?;
-            let name = &trade.curves[curve].name;
-            let what = trade.measure.label();
-            Some(Offer {
-                stop: Stop::Seconds(seconds),
-                curve,
-                expected: format!("{name}: {what} {error:.4}"),
-            })
-        });
-    errors.chain(seconds).collect()
+        }
+        Stop::Seconds(seconds) => {
+            let before = curve.points.iter().rev().find(|p| p.seconds <= seconds);
+            before.map(|point| point.error)
+        }
+    };
+    let presets = trade.curves.iter().enumerate().filter(|(_, c)| c.is_preset);
+    let values = presets.filter_map(|(i, curve)| Some((i, value(curve)?)));
+    let (curve, best) = values.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let name = &trade.curves[curve].name;
+    let expected = match stop {
+        Stop::Error(_) => format!("{name}: after {best:.1} s"),
+        Stop::Seconds(_) => format!("{name}: {} {best:.4}", trade.measure.label()),
+    };
+    Some(Offer {
+        stop,
+        curve,
+        expected,
+    })
 }
 
 /// The stop at a point of a curve, rounded up to two digits so that a solve reaches it.

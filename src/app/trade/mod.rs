@@ -1,12 +1,11 @@
 //! The trade of speed for exactness of the open capture, read from its results or measured here.
 
 pub mod choice;
-pub mod measuring;
 
+use crate::app::task::Task;
 use crate::session::snapshot::OpenCapture;
 use crate::study::trade::Trade;
 use egui::Pos2;
-use measuring::Measuring;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -31,6 +30,9 @@ pub struct TradeView {
     pub places: Vec<(Pos2, usize, usize)>,
 }
 
+/// A measurement, which shows all curves so far.
+pub type Measuring = Task<Arc<Trade>, ()>;
+
 /// The trade of the open capture, as far as it is measured.
 #[derive(Default)]
 pub struct Measured {
@@ -38,8 +40,8 @@ pub struct Measured {
     pub trade: Option<Arc<Trade>>,
     /// Whether the curves were measured here and are in no file yet.
     pub unsaved: bool,
-    /// The measurement under way.
-    pub measuring: Option<Measuring>,
+    /// What is being measured, and the measurement under way.
+    pub measuring: Option<(Arc<OpenCapture>, Measuring)>,
 }
 
 /// Seconds that a measurement may take.
@@ -74,6 +76,6 @@ impl Measured {
 
     /// What is being measured now, in words.
     pub fn doing(&self) -> Option<String> {
-        self.measuring.as_ref().map(|m| m.task.doing())
+        self.measuring.as_ref().map(|(_, task)| task.doing())
     }
 }
