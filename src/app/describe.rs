@@ -56,33 +56,37 @@ fn color_word(albedo: Vec3) -> &'static str {
 mod tests {
     use super::*;
 
-    fn object(name: &str, area: f64) -> Object {
-        Object {
-            name: name.to_owned(),
-            triangles: Vec::new(),
-            area,
-        }
-    }
-
     #[test]
     fn segments_are_told_by_size_and_colour_and_named_objects_by_their_names() {
-        let of = |name, area, albedo: [f32; 3]| {
-            described(&object(name, area), 100.0, Some(Vec3::from_array(albedo)))
-        };
-        assert_eq!(
-            of("segment 004", 20.0, [0.8; 3]),
-            "segment 004, large white"
-        );
-        assert_eq!(
-            of("segment 040", 0.1, [0.3, 0.02, 0.02]),
-            "segment 040, small red"
-        );
-        assert_eq!(
-            of("segment 041", 1.0, [0.05, 0.1, 0.4]),
-            "segment 041, blue"
-        );
-        assert_eq!(of("wall", 20.0, [0.8; 3]), "wall");
-        let unknown = described(&object("segment 9", 1.0), 100.0, None);
-        assert_eq!(unknown, "segment 9");
+        for (name, area, albedo, expected) in [
+            (
+                "segment 004",
+                20.0,
+                Some([0.8; 3]),
+                "segment 004, large white",
+            ),
+            (
+                "segment 040",
+                0.1,
+                Some([0.3, 0.02, 0.02]),
+                "segment 040, small red",
+            ),
+            (
+                "segment 041",
+                1.0,
+                Some([0.05, 0.1, 0.4]),
+                "segment 041, blue",
+            ),
+            ("segment 9", 1.0, None, "segment 9"),
+            ("wall", 20.0, Some([0.8; 3]), "wall"),
+        ] {
+            let object = Object {
+                name: name.to_owned(),
+                triangles: Vec::new(),
+                area,
+            };
+            let albedo = albedo.map(Vec3::from_array);
+            assert_eq!(described(&object, 100.0, albedo), expected);
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::app::shell::dialogs::Dialogs;
 use crate::app::shell::notices::Notices;
-use crate::app::shell::photographs::Batch;
+use crate::app::shell::status::Batch;
 use crate::app::task::Task;
 use crate::app::trade::Measured;
 use crate::app::worker::Worker;

@@ -138,14 +138,10 @@ pub fn place(scene: &Scene, object: u32, camera: &Camera) -> Option<String> {
     let sums = sampled.map(|&triangle| scene.corners(triangle).iter().sum::<Vec3>());
     let middle = sums.sum::<Vec3>() / corners;
     let k = &camera.intrinsics;
-    let pixel = camera.project(middle);
     let part = |at: f32, whole: u32, words: [&'static str; 3]| {
         words[((at / whole as f32 * 3.0) as usize).min(2)]
     };
-    let inside = pixel.filter(|p| {
-        p.cmpge(glam::Vec2::ZERO).all() && p.x < k.width as f32 && p.y < k.height as f32
-    });
-    Some(match inside {
+    Some(match camera.project(middle) {
         Some(at) => {
             let height = part(at.y, k.height, ["high", "", "low"]);
             let side = part(at.x, k.width, ["left", "middle", "right"]);

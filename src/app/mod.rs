@@ -1,7 +1,6 @@
 //! The window: panes over a session, drawn by egui and wgpu. Talks to the worker through [`worker::Connection`].
 
 pub mod action;
-mod choices;
 pub mod controls;
 pub mod describe;
 pub mod document;

@@ -29,13 +29,13 @@ fn words(ui: &mut Ui, pane: Pane, parts: &mut Parts<'_>, jobs: &Jobs) {
     match (pane, document.capture()) {
         (Pane::Loss, _) => loss::pane(ui, progress),
         (Pane::Trade, _) => trade::pane(ui, parts, &jobs.measured),
-        (Pane::Log, _) => log::pane(ui, &jobs.notices),
+        (Pane::Log, _) => report::log(ui, &jobs.notices),
         (Pane::Settings, _) => {
             let settings = &document.settings;
             scrolled.show(ui, |ui| settings::pane(ui, settings, parts.requests));
         }
         (Pane::Stages, _) => {
-            scrolled.show(ui, |ui| stages::pane(ui, progress));
+            scrolled.show(ui, |ui| report::stages(ui, progress));
         }
         (_, None) => {
             ui.weak(document.nothing_open());
@@ -58,7 +58,7 @@ fn words(ui: &mut Ui, pane: Pane, parts: &mut Parts<'_>, jobs: &Jobs) {
             scrolled.show(ui, |ui| insert::pane(ui, parts, &capture.scene));
         }
         (_, Some(capture)) => {
-            scrolled.show(ui, |ui| capture::pane(ui, capture, progress));
+            scrolled.show(ui, |ui| report::capture(ui, capture, progress));
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The active tool: what the next click or drag in a view does instead of selecting.
 
 use crate::app::insertion::Insertions;
-use crate::app::insertion::handles::{Along, Handle};
+use crate::app::insertion::handles::Handle;
 use crate::app::insertion::transform::Transform;
 use crate::compose::placement::Placement;
 use crate::scene::Scene;
@@ -88,8 +88,8 @@ impl Tool {
             return (false, None);
         };
         let (ray, surface) = aim(pointer);
-        let along = Along::of(response.ctx.input(|input| input.modifiers));
-        let placed = insertions.dragged(handle, scene, &ray, surface, along);
+        let modifiers = response.ctx.input(|input| input.modifiers);
+        let placed = insertions.dragged(handle, scene, &ray, surface, modifiers);
         (true, placed)
     }
 }

@@ -23,29 +23,6 @@ pub enum Kind {
 /// What can be dragged: the object's index, and what the handle does to it.
 pub type Handle = (usize, Kind);
 
-/// What a foot is moved along.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Along {
-    /// The surfaces under the pointer.
-    #[default]
-    Surfaces,
-    /// The up axis.
-    Up,
-    /// The plane that it stands on, through whatever is there.
-    Level,
-}
-
-impl Along {
-    /// With Shift up and down, with Ctrl on one level.
-    pub fn of(modifiers: Modifiers) -> Self {
-        match (modifiers.shift, modifiers.command) {
-            (true, _) => Self::Up,
-            (false, true) => Self::Level,
-            _ => Self::Surfaces,
-        }
-    }
-}
-
 /// Least and greatest scale of an object.
 pub const SCALES: (f64, f64) = (1e-6, 1e6);
 
@@ -63,31 +40,27 @@ impl Insertions {
         let shown = self.objects.iter().enumerate().filter(|(_, o)| !o.hidden);
         for (index, object) in shown {
             for kind in [Kind::Rotate, Kind::Scale, Kind::Move] {
-                let place = match kind {
-                    Kind::Move => foot(object, scene),
-                    _ if self.chosen != Some(index) => None,
-                    Kind::Rotate => self.rotate_handle(object, scene),
-                    Kind::Scale => self.scale_handle(object, scene),
-                };
-                let shown = place.and_then(&project);
-                handles.extend(shown.map(|at| ((index, kind), at)));
+                if (kind == Kind::Move || self.chosen == Some(index))
+                    && let Some(at) = self.place(kind, object, scene).and_then(&project)
+                {
+                    handles.push(((index, kind), at));
+                }
             }
         }
         handles
     }
 
-    /// Where the handle that rotates a placed object is, in scene coordinates: beside its file's +x side, on the ground.
-    fn rotate_handle(&self, object: &Placement, scene: &Scene) -> Option<Vec3> {
+    /// Where a handle of a placed object is, in scene coordinates: that which rotates it is on the ground beside its file's +x side.
+    fn place(&self, kind: Kind, object: &Placement, scene: &Scene) -> Option<Vec3> {
         let foot = foot(object, scene)?;
+        if kind == Kind::Move {
+            return Some(foot);
+        }
         let corners = self.models.corners(object, scene)?;
-        let side = (corners[1] + corners[5]) * 0.5;
-        Some(foot + (side - foot) * 1.3)
-    }
-
-    /// Where the handle above a placed object is, in scene coordinates.
-    fn scale_handle(&self, object: &Placement, scene: &Scene) -> Option<Vec3> {
-        let foot = foot(object, scene)?;
-        let corners = self.models.corners(object, scene)?;
+        if kind == Kind::Rotate {
+            let side = (corners[1] + corners[5]) * 0.5;
+            return Some(foot + (side - foot) * 1.3);
+        }
         let height = (corners[2] - corners[0]).length();
         let width = (corners[1] - corners[0]).length();
         Some(foot + scene.up * (height + 0.2 * height.max(width)))
@@ -105,23 +78,24 @@ impl Insertions {
         handles.into_iter().find(near).map(|(handle, _)| handle)
     }
 
-    /// An object's index and placement after `handle` is dragged to the pointer's `ray`, which hits `surface`.
+    /// An object's index and placement after `handle` is dragged to the pointer's `ray`, which hits `surface`. It moves over
+    /// surfaces, up and down with Shift, and on its level through whatever is there with Ctrl.
     pub fn dragged(
         &self,
         handle: Handle,
         scene: &Scene,
         ray: &Ray,
         surface: Option<DVec3>,
-        along: Along,
+        modifiers: Modifiers,
     ) -> Option<(usize, Placement)> {
         let (index, kind) = handle;
         let mut object = self.objects.get(index)?.clone();
         match kind {
             Kind::Move => {
-                let to = match along {
-                    Along::Surfaces => surface,
-                    Along::Up => raised(&object, scene, ray),
-                    Along::Level => levelled(&object, scene, ray),
+                let to = match (modifiers.shift, modifiers.command) {
+                    (true, _) => raised(&object, scene, ray),
+                    (false, true) => levelled(&object, scene, ray),
+                    (false, false) => surface,
                 };
                 object.at = to.or(object.at);
             }
@@ -133,7 +107,10 @@ impl Insertions {
 
     /// The scale that brings the handle above an object to where the ray passes the axis through its foot.
     fn resized(&self, object: &Placement, scene: &Scene, ray: &Ray) -> Option<f64> {
-        let (foot, top) = (foot(object, scene)?, self.scale_handle(object, scene)?);
+        let (foot, top) = (
+            foot(object, scene)?,
+            self.place(Kind::Scale, object, scene)?,
+        );
         let wanted = height_of(foot, scene.up, ray)?;
         let factor = f64::from(wanted / top.distance(foot));
         let scale = (object.scale * factor).clamp(SCALES.0, SCALES.1);
@@ -142,7 +119,10 @@ impl Insertions {
 
     /// The angle that turns an object's handle to where the ray meets the ground plane that it stands on, degrees.
     fn turned(&self, object: &Placement, scene: &Scene, ray: &Ray) -> Option<f64> {
-        let (foot, handle) = (foot(object, scene)?, self.rotate_handle(object, scene)?);
+        let (foot, handle) = (
+            foot(object, scene)?,
+            self.place(Kind::Rotate, object, scene)?,
+        );
         let aim = on_plane(foot, scene.up, ray)? - foot;
         let back = Quat::from_axis_angle(scene.up, -object.rotate.to_radians() as f32);
         let unturned = back * (handle - foot);
@@ -223,7 +203,6 @@ pub(super) fn height_of(point: Vec3, up: Vec3, ray: &Ray) -> Option<f32> {
     height.is_finite().then_some(height)
 }
 
-/// A number rounded to three digits.
 pub(super) fn three_digits(value: f64) -> f64 {
     let unit = 10f64.powf(value.abs().log10().floor() - 2.0);
     (value / unit).round() * unit
@@ -231,37 +210,26 @@ pub(super) fn three_digits(value: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{Along, Kind};
+    use super::Kind;
     use crate::app::insertion::Insertions;
+    use crate::app::insertion::models::tests::models;
     use crate::app::model::tests::scene;
     use crate::scene::geometry::Ray;
+    use egui::Modifiers;
     use glam::{DVec3, Vec3};
 
-    /// An object whose box is 0.4 wide and 0.2 high about the origin, chosen, in a scene.
-    fn inserted(scene: &crate::scene::Scene) -> Insertions {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let file = folder.path().join("cube.obj");
-        let text = "v -0.2 0 -0.2\nv 0.2 0 0.2\nv 0.2 0.2 0.2\nf 1 2 3\n";
-        std::fs::write(&file, text).expect("written");
+    /// An object whose box is 0.4 wide and 0.2 high about the origin, chosen.
+    fn inserted() -> Insertions {
         let mut insertions = Insertions::default();
-        insertions.add(file, Some(DVec3::ZERO), 1.0);
-        let ctx = egui::Context::default();
-        for _ in 0..500 {
-            let read = insertions.models.update(&ctx, &insertions.objects);
-            if !read.is_empty() {
-                let handle = insertions.scale_handle(&insertions.objects[0], scene);
-                assert!(handle.is_some());
-                return insertions;
-            }
-            std::thread::sleep(std::time::Duration::from_millis(5));
-        }
-        panic!("the object was not read");
+        insertions.add("cube.obj".into(), Some(DVec3::ZERO), 1.0);
+        insertions.models = models([[-0.2, 0.0, -0.2], [0.2, 0.0, 0.2], [0.2, 0.2, 0.2]]);
+        insertions
     }
 
     #[test]
     fn the_handle_beside_turns_the_object_towards_the_pointer_counter_clockwise_from_above() {
         let scene = scene();
-        let mut insertions = inserted(&scene);
+        let mut insertions = inserted();
         let foot = (DVec3::ZERO - scene.origin).as_vec3();
         // Straight down onto the ground, north of the object (−z): a quarter turn from +x.
         for (aim, degrees) in [(Vec3::NEG_Z, 90.0), (Vec3::Z, -90.0), (Vec3::X, 0.0)] {
@@ -276,35 +244,35 @@ mod tests {
     #[test]
     fn the_handle_above_scales_and_the_foot_moves_over_surfaces_up_or_on_one_level() {
         let scene = scene();
-        let mut insertions = inserted(&scene);
+        let mut insertions = inserted();
         let local = |point: DVec3| (point - scene.origin).as_vec3();
         let ray = |from: DVec3, to: DVec3| Ray::new(local(from), (to - from).as_vec3());
 
         // The handle stands at 0.2 + 0.08; at twice that height the object is twice as large.
         let size = (0, Kind::Scale);
         let aim = ray(DVec3::new(0.3, 0.5, 3.0), DVec3::new(0.0, 0.56, 0.0));
-        let dragged = insertions.dragged(size, &scene, &aim, None, Along::Surfaces);
+        let dragged = insertions.dragged(size, &scene, &aim, None, Modifiers::NONE);
         insertions.objects[0] = dragged.expect("a size").1;
         let scale = insertions.objects[0].scale;
         assert!((scale - 2.0).abs() < 1e-9, "{scale}");
         // Below the foot there is no size.
         let below = ray(DVec3::new(0.3, 0.5, 3.0), DVec3::new(0.0, -0.4, 0.0));
-        let dragged = insertions.dragged(size, &scene, &below, None, Along::Surfaces);
+        let dragged = insertions.dragged(size, &scene, &below, None, Modifiers::NONE);
         assert!(dragged.is_none());
 
         let level = DVec3::new(0.4, 0.7, 0.1);
         let raised = DVec3::Y * 0.7;
-        for (height, to, along, expected) in [
-            (1.0, raised, Along::Up, raised),
-            (2.0, level, Along::Level, level),
-            (2.0, level, Along::Surfaces, DVec3::X),
+        for (height, to, modifiers, expected) in [
+            (1.0, raised, Modifiers::SHIFT, raised),
+            (2.0, level, Modifiers::COMMAND, level),
+            (2.0, level, Modifiers::NONE, DVec3::X),
         ] {
             let aim = ray(DVec3::new(0.0, height, 3.0), to);
             let foot = (0, Kind::Move);
-            let dragged = insertions.dragged(foot, &scene, &aim, Some(DVec3::X), along);
+            let dragged = insertions.dragged(foot, &scene, &aim, Some(DVec3::X), modifiers);
             insertions.objects[0] = dragged.expect("a place").1;
             let at = insertions.objects[0].at.expect("a place");
-            assert!(at.distance(expected) < 1e-5, "{along:?}: {at}");
+            assert!(at.distance(expected) < 1e-5, "{modifiers:?}: {at}");
         }
     }
 }

@@ -9,15 +9,13 @@ use crate::scene::geometry::Ray;
 use egui::{Context, Key, Modifiers, Pos2};
 use glam::{DQuat, DVec2, DVec3, EulerRot, Vec3};
 
-/// An axis of the capture's coordinates: x, y or z.
-type Axis = usize;
-
 /// A transform under way. It moves over surfaces or along the axis, and rotates about the up axis or about the axis, by the angle
 /// that the pointer goes around the object's foot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transform {
     kind: Kind,
-    axis: Option<Axis>,
+    /// The axis of the capture's coordinates: x, y or z.
+    axis: Option<usize>,
     /// The object's index and placement at the start.
     index: usize,
     before: Placement,
@@ -136,7 +134,7 @@ mod tests {
     use super::*;
     use crate::app::model::tests::scene;
 
-    fn begun(kind: Kind, axis: Option<Axis>) -> Transform {
+    fn begun(kind: Kind, axis: Option<usize>) -> Transform {
         Transform {
             kind,
             axis,

@@ -46,7 +46,6 @@ pub struct MeshPaint {
     pub size: [u32; 2],
 }
 
-/// Everything on the card.
 struct Meshes {
     mesh_pipeline: wgpu::RenderPipeline,
     screen_pipeline: wgpu::RenderPipeline,

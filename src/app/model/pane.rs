@@ -3,10 +3,12 @@
 use crate::app::controls::{choose, named};
 use crate::app::model::gpu::{MeshPaint, SceneUniform};
 use crate::app::model::lasso::Lasso;
-use crate::app::model::overlay::{self, Projection};
+use crate::app::model::overlay::{self, projection};
 use crate::app::model::view::ModelView;
 use crate::app::picture::gpu::rgba;
+use crate::app::picture::look::fraction;
 use crate::app::request::Request;
+use crate::app::shown::ray;
 use crate::app::theme;
 use crate::app::tool::{Clicked, Pick};
 use crate::app::view::Parts;
@@ -41,7 +43,7 @@ pub fn pane(ui: &mut Ui, parts: &mut Parts<'_>) {
     // A click keeps what the keys began.
     if transform.take_if(|_| response.clicked()).is_none() {
         let transforms = transform.is_some() && response.hovered();
-        if !move_object(ui, parts, scene, &response) {
+        if !move_object(parts, scene, &response) {
             if !cuts {
                 drag(ui, &mut parts.view.model, &response);
             }
@@ -97,15 +99,13 @@ fn controls(ui: &mut Ui, model: &mut ModelView) {
     });
 }
 
-/// Where the pointer is in the view, in its pixels.
-fn pixel(ui: &Ui, rect: Rect, pointer: egui::Pos2) -> Vec2 {
-    let offset = (pointer - rect.min) * ui.pixels_per_point();
-    Vec2::new(offset.x, offset.y)
+/// The ray through a point of the screen.
+fn aimed(model: &ModelView, rect: Rect, pointer: egui::Pos2) -> Ray {
+    ray(&model.orbit.camera(), fraction(rect, pointer))
 }
 
-/// The surface under a pixel, leaving out what is not drawn.
-fn under(model: &ModelView, scene: &Scene, pixel: Vec2) -> Option<Hit> {
-    let mut ray = model.orbit.camera().ray(pixel);
+/// The surface that a ray meets, leaving out what is not drawn.
+fn under(model: &ModelView, scene: &Scene, mut ray: Ray) -> Option<Hit> {
     loop {
         let hit = scene.intersect(&ray)?;
         let normal = scene.normals.get(hit.triangle as usize)?;
@@ -136,16 +136,13 @@ fn zoom_and_fly(ui: &Ui, model: &mut ModelView, scene: &Scene, response: &Respon
     let Some(pointer) = response.hover_pos() else {
         return;
     };
-    let at = pixel(ui, response.rect, pointer);
+    let ray = aimed(model, response.rect, pointer);
     let (scroll, pinch) = ui.input(|input| (input.smooth_scroll_delta.y, input.zoom_delta()));
     let factor = (scroll * 0.004).exp() * pinch;
     if factor != 1.0 {
-        let point = match under(model, scene, at) {
+        let point = match under(model, scene, ray) {
             Some(hit) => scene.point(&hit),
-            None => {
-                let ray = model.orbit.camera().ray(at);
-                ray.origin + ray.direction * model.orbit.distance
-            }
+            None => ray.origin + ray.direction * model.orbit.distance,
         };
         model.orbit.zoom_to(point, 1.0 / factor, scene);
     }
@@ -179,9 +176,9 @@ fn cut_out(ui: &Ui, parts: &mut Parts<'_>, scene: &Scene, response: &Response) -
         let object_of = |face: u32| scene.object_of[face as usize];
         let faces = (0..scene.triangles.len() as u32)
             .filter(|&face| selected.is_empty() || selected.contains(&object_of(face)));
-        let projection = Projection::new(&view.model.orbit, scene, response.rect);
-        let seen = |at| under(&view.model, scene, pixel(ui, response.rect, at));
-        let enclosed = lasso.enclosed(scene, faces, |point| projection.at(point), seen);
+        let project = projection(&view.model.orbit, scene, response.rect);
+        let seen = |at| under(&view.model, scene, aimed(&view.model, response.rect, at));
+        let enclosed = lasso.enclosed(scene, faces, project, seen);
         view.tool.pick = None;
         parts.requests.ask(Request::CutOut(enclosed));
     }
@@ -200,17 +197,16 @@ fn cut_out(ui: &Ui, parts: &mut Parts<'_>, scene: &Scene, response: &Response) -
 }
 
 /// Moves an inserted object by the pointer; false where it has hold of none.
-fn move_object(ui: &Ui, parts: &mut Parts<'_>, scene: &Scene, response: &Response) -> bool {
+fn move_object(parts: &mut Parts<'_>, scene: &Scene, response: &Response) -> bool {
     let (tool, model) = (&mut parts.view.tool, &parts.view.model);
     let lasso = tool.pick == Some(Pick::Lasso);
     let started = response.drag_started_by(PointerButton::Primary) && !lasso;
-    let projection = Projection::new(&model.orbit, scene, response.rect);
-    let project = |point| projection.at(point);
+    let project = projection(&model.orbit, scene, response.rect);
     let aim = |pointer| {
-        let pixel = pixel(ui, response.rect, pointer);
-        let hit = under(model, scene, pixel);
+        let ray = aimed(model, response.rect, pointer);
+        let hit = under(model, scene, ray);
         let surface = hit.map(|hit| scene.point(&hit).as_dvec3() + scene.origin);
-        (model.orbit.camera().ray(pixel), surface)
+        (ray, surface)
     };
     let insertions = &parts.document.insertions;
     let (holds, placed) = tool.follow(response, started, insertions, scene, project, aim);
@@ -231,15 +227,14 @@ fn click(ui: &Ui, parts: &mut Parts<'_>, scene: &Scene, response: &Response) {
         requests.ask(Request::LookThrough(frame));
         return;
     }
-    let at = pixel(ui, response.rect, pointer);
-    let hit = under(&view.model, scene, at);
+    let ray = aimed(&view.model, response.rect, pointer);
+    let hit = under(&view.model, scene, ray);
     if let Some(hit) = &hit
         && response.double_clicked()
     {
         let orbit = &mut view.model.orbit;
         orbit.target = orbit.eye() + orbit.forward() * scene.point(hit).distance(orbit.eye());
     }
-    let ray = view.model.orbit.camera().ray(at);
     let more = ui.input(|input| input.modifiers.command);
     let clicked = hit.and_then(|hit| Clicked::new(scene, &ray, &hit));
     requests.ask(Request::Click(clicked, more));

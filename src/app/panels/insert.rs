@@ -72,7 +72,6 @@ fn add(ui: &mut Ui, adding: &mut Adding, requests: &mut Requests) {
     });
 }
 
-/// All inserted objects.
 fn list(ui: &mut Ui, insertions: &Insertions, requests: &mut Requests) {
     for (index, object) in insertions.objects.iter().enumerate() {
         ui.horizontal(|ui| {
@@ -97,7 +96,6 @@ fn list(ui: &mut Ui, insertions: &Insertions, requests: &mut Requests) {
     }
 }
 
-/// Buttons for the chosen object.
 fn actions(ui: &mut Ui, placing: bool, requests: &mut Requests) {
     ui.horizontal_wrapped(|ui| {
         let text = match placing {
@@ -157,7 +155,6 @@ fn edit(ui: &mut Ui, object: &mut Placement, diameter: f64) {
     });
 }
 
-/// An angle in degrees.
 fn degrees(ui: &mut Ui, name: &str, prefix: &str, angle: &mut f64) {
     let drag = DragValue::new(angle).range(-360.0..=360.0).speed(1.0);
     let drag = drag.max_decimals(4).prefix(prefix).suffix(" °");
@@ -220,9 +217,8 @@ fn results(ui: &mut Ui, finish: bool, requests: &mut Requests) {
     });
     let mut wanted = finish;
     let help = "Makes objects as soft and as grainy as the 8-bit photograph that they are put into";
-    ui.checkbox(&mut wanted, "Blur and grain of the photograph")
-        .on_hover_text(help);
-    if wanted != finish {
+    let finish = ui.checkbox(&mut wanted, "Blur and grain of the photograph");
+    if finish.on_hover_text(help).changed() {
         requests.ask(Request::Finish(wanted));
     }
 }

@@ -67,7 +67,6 @@ fn title(source: LightSource, scene: &Scene, camera: Option<&Camera>) -> String 
     place.map_or_else(|| name.to_owned(), |place| format!("{name}, {place}"))
 }
 
-/// The light of one lamp.
 fn light(ui: &mut Ui, document: &Document, objects: &[usize], name: &str, requests: &mut Requests) {
     let before = document.gain(objects);
     let mut gain = before;

@@ -14,7 +14,6 @@ use crate::transport::material::DIELECTRIC;
 use egui::{Button, DragValue, Grid, Role, Ui};
 use glam::Vec3;
 
-/// Names of the channels.
 const CHANNELS: [&str; 3] = ["red", "green", "blue"];
 
 /// Draws the pane.
@@ -78,7 +77,6 @@ fn drag(ui: &mut Ui, drag: DragValue<'_>, name: &str, help: &str) -> bool {
     named(response, Role::SpinButton, name).changed()
 }
 
-/// Colour of the surface.
 fn albedo(ui: &mut Ui, found: &ObjectEstimate, edit: &mut ObjectEdit) {
     let help = "Diffuse reflectance, 0 to 1 (no unit), linear; replaces a texture by one colour";
     ui.label("Albedo").on_hover_text(help);

@@ -1,8 +1,7 @@
 //! The table of objects: swatches, errors, pixels seen; sortable, with a filter, linked to the views.
 
 use crate::app::action::Action;
-use crate::app::choices::choices;
-use crate::app::controls::{labelled, named, switched};
+use crate::app::controls::{choices, labelled, named, switched};
 use crate::app::describe::described;
 use crate::app::document::Document;
 use crate::app::number::{number, triple};

@@ -6,7 +6,7 @@ use crate::app::panels::plot::{at, decades, hovered, legend};
 use crate::app::request::{Request, Requests};
 use crate::app::theme::{self, Tokens};
 use crate::app::trade::choice::{Stop, offers, stop_at};
-use crate::app::trade::{Limit, Measured, TradeView, Vertical};
+use crate::app::trade::{Measured, TradeView, Vertical};
 use crate::app::view::Parts;
 use crate::inverse::settings::{Preset, Settings};
 use crate::session::snapshot::Snapshot;
@@ -52,7 +52,7 @@ pub fn pane(ui: &mut Ui, parts: &mut Parts<'_>, measured: &Measured) {
 }
 
 /// The button that measures, and what it is at.
-fn measuring(ui: &mut Ui, measured: &Measured, limit: &mut Limit, requests: &mut Requests) {
+fn measuring(ui: &mut Ui, measured: &Measured, limit: &mut f64, requests: &mut Requests) {
     ui.horizontal(|ui| {
         let doing = measured.doing();
         let text = if doing.is_some() { "Cancel" } else { "Measure" };
@@ -65,7 +65,7 @@ fn measuring(ui: &mut Ui, measured: &Measured, limit: &mut Limit, requests: &mut
                 ui.label(doing);
             }
             None => {
-                let seconds = DragValue::new(&mut limit.0).range(5.0..=3600.0);
+                let seconds = DragValue::new(limit).range(5.0..=3600.0);
                 labelled(ui, "in", seconds.suffix(" s"))
                     .on_hover_text("Time for all presets together");
                 if measured.unsaved && ui.button("Keep").on_hover_text(KEEP).clicked() {

@@ -10,8 +10,8 @@ mod trade;
 use crate::app::action::{Action, Needs};
 use crate::app::layout::{Pane, Workspace};
 use crate::app::model::lasso::Lasso;
-use crate::app::picture::compare::Mode;
 use crate::app::picture::copy::as_seen;
+use crate::app::picture::look::Mode;
 use crate::app::picture::quantity::Quantity;
 use crate::app::request::{Request, Requests};
 use crate::app::shell::dialogs::Ask;
@@ -37,11 +37,10 @@ impl App {
     /// Whether an action makes sense now.
     fn can(&self, action: Action) -> bool {
         let document = &self.document;
-        let open = document.capture().is_some();
         let ready = match action.needs() {
             Needs::Nothing => true,
-            Needs::Capture => open,
-            Needs::CurrentObjects => open && document.objects_are_current(),
+            Needs::Capture => document.capture().is_some(),
+            Needs::CurrentObjects => document.can_regroup(),
         };
         // What it needs is there; now whether it would do something.
         let selection = &self.view.selection;
@@ -52,9 +51,8 @@ impl App {
                 Action::SwitchLamp => self.edited_object().is_some_and(|o| document.is_lamp(o)),
                 Action::ResetMaterial => (self.edited_object())
                     .is_some_and(|o| document.edits.object(o) != ObjectEdit::default()),
-                Action::JoinObjects => document.can_regroup() && selection.all().len() > 1,
-                Action::RenameObject => document.can_regroup() && selection.object.is_some(),
-                Action::CutOut => document.can_regroup(),
+                Action::JoinObjects => selection.all().len() > 1,
+                Action::RenameObject => selection.object.is_some(),
                 Action::SolveOn => !document.edits.known().is_empty(),
                 Action::ResetEdits => !document.edits.is_empty(),
                 Action::ResetLights => document.lights_are_changed(),
@@ -145,7 +143,7 @@ impl App {
             Action::StartPage => self.view.shell.start.asked ^= true,
             Action::Save => self.view.shell.sheet = Sheet::save(self.capture_name()),
             Action::Export => {
-                self.view.shell.sheet = Sheet::export(self.capture_name(), self.probe_point())
+                self.view.shell.sheet = Sheet::export(self.capture_name(), 0, self.probe_point())
             }
             Action::SaveLayers => self.view.shell.sheet = Sheet::layers(self.capture_name()),
             Action::SavePhotographs => {
@@ -292,10 +290,7 @@ impl App {
 
     /// Shows the remembered theme.
     pub fn apply_theme(&self, ctx: &Context) {
-        ctx.set_theme(match self.preferences.light {
-            true => Theme::Light,
-            false => Theme::Dark,
-        });
+        ctx.set_theme(Theme::from_dark_mode(!self.preferences.light));
     }
 
     /// Where a light probe is taken if no point was clicked: at the chosen inserted object, or at the 3D view's target.

@@ -1,7 +1,7 @@
 //! Writing photographs in one go.
 
-use crate::app::shell::photographs::Batch;
 use crate::app::shell::sheet::Wanted;
+use crate::app::shell::status::Batch;
 use crate::app::state::App;
 use crate::app::task::{Progress, Task};
 use crate::error::{Error, Result};
@@ -20,7 +20,6 @@ impl App {
         document.capture().is_some() && self.jobs.batch.is_none() && changed
     }
 
-    /// Begins to write photographs.
     pub(super) fn write_photographs(&mut self, wanted: &Wanted, ctx: &egui::Context) {
         let document = &self.document;
         let Some(capture) = document.capture().filter(|_| self.can_write_photographs()) else {

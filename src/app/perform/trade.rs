@@ -25,7 +25,7 @@ impl App {
         let Some(capture) = self.document.capture().filter(|_| self.can_measure()) else {
             return;
         };
-        let (seed, limit) = (self.document.settings.seed, self.view.panels.trade.limit.0);
+        let (seed, limit) = (self.document.settings.seed, self.view.panels.trade.limit);
         let limit = Duration::try_from_secs_f64(limit).unwrap_or(Duration::MAX);
         let [capture, measured] = [capture.clone(), capture.clone()];
         let run = move |progress: &Progress<_>| run(progress, &measured, seed, limit);

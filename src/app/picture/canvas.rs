@@ -127,13 +127,22 @@ pub fn paint(ui: &Ui, parts: &Parts<'_>, rect: Rect, drawn: &Drawn, slot: Id) {
     let paint = eframe::egui_wgpu::Callback::new_paint_callback(rect, paint);
     ui.painter().add(paint);
     let placement = view.look.placement(rect, drawn.size());
-    handles(ui, parts, rect, placement);
+    let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
 
+    let boxed = view.tool.placing || view.tool.dragged.is_some();
+    // Nothing covers a result that is only looked at.
+    let handles = boxed || ui.rect_contains_pointer(rect);
+    let document = parts.document;
+    let seen = document.capture().zip(view.shown.camera(document));
+    if let Some((capture, camera)) = seen.filter(|_| handles) {
+        let project = |point| on_screen(camera, placement, point);
+        let (scene, insertions) = (&capture.scene, &document.insertions);
+        insertions.draw_handles(&painter, scene, tokens, boxed, project);
+    }
     // The cursor of the pane that the pointer is in, in all the others.
     if let Some(cursor) = view.look.cursor
         && cursor.over != drawn.quantity
     {
-        let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
         let at = placement.min + cursor.at.to_vec2() * placement.size();
         for (color, width) in [(Color32::from_black_alpha(160), 3.0), (tokens.strong, 1.0)] {
             for arm in [
@@ -149,21 +158,5 @@ pub fn paint(ui: &Ui, parts: &Parts<'_>, rect: Rect, drawn: &Drawn, slot: Id) {
     let shading = drawn.quantity.shading();
     if matches!(shading, Shading::Signed | Shading::Positive) {
         inspect::legend(ui, rect, drawn);
-    }
-}
-
-/// Handles of inserted objects, and a box around the chosen one while it is placed or moved.
-fn handles(ui: &Ui, parts: &Parts<'_>, rect: Rect, placement: Rect) {
-    let (document, view) = (parts.document, &parts.view);
-    let Some((capture, camera)) = document.capture().zip(view.shown.camera(document)) else {
-        return;
-    };
-    let boxed = view.tool.placing || view.tool.dragged.is_some();
-    // Nothing covers a result that is only looked at.
-    if boxed || ui.rect_contains_pointer(rect) {
-        let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
-        let project = |point| on_screen(camera, placement, point);
-        let (scene, tokens) = (&capture.scene, theme::tokens(ui));
-        (document.insertions).draw_handles(&painter, scene, tokens, boxed, project);
     }
 }

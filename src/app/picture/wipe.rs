@@ -2,7 +2,7 @@
 
 use crate::app::controls::{choose, named};
 use crate::app::picture::canvas;
-use crate::app::picture::compare::{Compare, Mode};
+use crate::app::picture::look::{Compare, Mode};
 use crate::app::picture::quantity::Quantity;
 use crate::app::theme;
 use crate::app::view::Parts;

@@ -1,10 +1,11 @@
 //! Draws the sheets: a typed path, a dialog where there is one.
 
-use crate::app::controls::{go_or_cancel, labelled, point};
+use crate::app::action::Action;
+use crate::app::controls::{go_or_cancel, labelled, path_field, point};
 use crate::app::request::{Request, Requests};
-use crate::app::shell::path::path_and_buttons;
-use crate::app::shell::sheet::{FORMATS, Sheet, ending};
-use crate::app::shell::{photographs, sessions};
+use crate::app::shell::dialogs::Ask;
+use crate::app::shell::sessions;
+use crate::app::shell::sheet::{FORMATS, Sheet, Wanted, ending};
 use crate::app::view::Parts;
 use crate::session::command::{Command, ExportFormat, ExportRequest};
 use egui::{DragValue, Id, Modal, Ui};
@@ -19,18 +20,14 @@ pub fn show(ctx: &egui::Context, parts: &mut Parts<'_>) {
     }
     let modal = Modal::new(Id::unique("sheet")).show(ctx, |ui| {
         ui.set_width(420.0);
-        let (document, requests) = (parts.document, &mut *parts.requests);
-        let view = &mut *parts.view;
         match &mut sheet {
             Sheet::Closed => true,
-            Sheet::Sessions => sessions::sheet(ui, document, &mut view.shell.sessions, requests),
-            Sheet::Save(folder) => save(ui, folder, requests),
+            Sheet::Sessions => sessions::sheet(ui, parts),
+            Sheet::Save(folder) => save(ui, folder, parts.requests),
             Sheet::Layers(file) => layers(ui, parts, file),
             Sheet::Export { file, format, at } => export(ui, parts, (file, format, at)),
-            Sheet::Length { found, metres } => length(ui, *found, metres, requests),
-            Sheet::Photographs(wanted) => {
-                photographs::sheet(ui, document, view.shown.frame, wanted, requests)
-            }
+            Sheet::Length { found, metres } => length(ui, *found, metres, parts.requests),
+            Sheet::Photographs(wanted) => photographs(ui, parts, wanted),
         }
     });
     if !modal.inner && !modal.should_close() {
@@ -42,11 +39,8 @@ pub fn show(ctx: &egui::Context, parts: &mut Parts<'_>) {
 fn save(ui: &mut Ui, folder: &mut String, requests: &mut Requests) -> bool {
     ui.heading("Save results");
     ui.label("Estimate, report, loss, scene and pictures, as `relit solve` writes them.");
-    let (go, close) = path_and_buttons(ui, "Folder", folder, ("Save", true), requests);
-    if go {
-        let folder = PathBuf::from(folder.trim());
-        requests.ask(Request::Send(Command::Save(folder)));
-    }
+    let (path, close) = path_and_buttons(ui, "Folder", folder, ("Save", true), requests);
+    requests.ask_all(path.map(|folder| Request::Send(Command::Save(folder))));
     close
 }
 
@@ -62,11 +56,9 @@ fn layers(ui: &mut Ui, parts: &mut Parts<'_>, file: &mut String) -> bool {
         |layers| format!("{} samples a pixel so far", layers.samples),
     ));
     let ready = layers.is_some();
-    let (go, close) = path_and_buttons(ui, "File", file, ("Save", ready), parts.requests);
-    if go {
-        let file = PathBuf::from(file.trim());
-        parts.requests.ask(Request::Send(Command::SaveLayers(file)));
-    }
+    let (path, close) = path_and_buttons(ui, "File", file, ("Save", ready), parts.requests);
+    let save = path.map(|file| Request::Send(Command::SaveLayers(file)));
+    parts.requests.ask_all(save);
     close
 }
 
@@ -100,13 +92,10 @@ fn export(
         });
         format = ExportFormat::Probe { at: *at };
     }
-    let (go, close) = path_and_buttons(ui, "File", file, ("Export", true), parts.requests);
-    if go {
-        let path = PathBuf::from(file.trim());
-        let request = ExportRequest { format, path };
-        let export = Request::Send(Command::Export(request));
-        parts.requests.ask(export);
-    }
+    let (path, close) = path_and_buttons(ui, "File", file, ("Export", true), parts.requests);
+    let request = path.map(|path| ExportRequest { format, path });
+    let export = request.map(|request| Request::Send(Command::Export(request)));
+    parts.requests.ask_all(export);
     close
 }
 
@@ -126,4 +115,68 @@ fn length(ui: &mut Ui, found: f64, metres: &mut f64, requests: &mut Requests) ->
         requests.ask(Request::Length(found, *metres));
     }
     clicked || cancel
+}
+
+/// Draws the sheet that writes photographs with objects in them and in changed light; true when it is to close.
+fn photographs(ui: &mut Ui, parts: &mut Parts<'_>, wanted: &mut Wanted) -> bool {
+    let (document, requests) = (parts.document, &mut *parts.requests);
+    let frame = parts.view.shown.frame;
+    ui.heading("Save photographs");
+    let objects = document.insertions.visible().len();
+    ui.label(match (objects, document.edits.is_empty()) {
+        (0, true) => "Insert an object, or change a lamp or a material first.",
+        (0, false) => "At full size, in the light as you changed it.",
+        (_, true) => "At full size, with the inserted objects; naive composites and layers beside them.",
+        (_, false) => {
+            "At full size, in the light as you changed it and with the inserted objects; naive composites and \
+             layers beside them."
+        }
+    });
+    ui.horizontal(|ui| {
+        let count = document.frames();
+        ui.radio_value(&mut wanted.all, true, format!("All {count} photographs"));
+        let shown = format!("Photograph {} alone, as {frame:03}", frame + 1);
+        ui.radio_value(&mut wanted.all, false, shown);
+    });
+    ui.horizontal(|ui| {
+        let help = "Paths a pixel: four times as many halve the noise";
+        let label = ui.label("Samples a pixel").on_hover_text(help);
+        let drag = DragValue::new(&mut wanted.samples).range(1..=4096);
+        ui.add(drag).labelled_by(label.id).on_hover_text(help);
+        ui.checkbox(&mut wanted.denoise, "Denoise")
+            .on_hover_text("Smooths the noise of light that is added or changed, guided by surfaces; never the photograph itself");
+    });
+    let go = ("Write", requests.can(Action::SavePhotographs));
+    let (path, close) = path_and_buttons(ui, "Folder", &mut wanted.folder, go, requests);
+    requests.ask_all(path.map(|_| Request::Photographs(wanted.clone())));
+    close
+}
+
+/// Draws the path of a sheet and its buttons: what is typed, if that is to be gone on with, and whether to close.
+fn path_and_buttons(
+    ui: &mut Ui,
+    label: &str,
+    path: &mut String,
+    (go, ready): (&str, bool),
+    requests: &mut Requests,
+) -> (Option<PathBuf>, bool) {
+    let ask = match label {
+        "Folder" => Ask::SaveFolder,
+        _ => Ask::ExportFile,
+    };
+    let entered = ui.horizontal(|ui| {
+        let (field, entered) = path_field(ui, label, path, "", 270.0);
+        // Takes the keys at once.
+        if ui.memory(|memory| memory.focused().is_none()) {
+            field.request_focus();
+        }
+        if ui.button("Browse…").clicked() {
+            requests.ask(Request::Browse(ask));
+        }
+        entered
+    });
+    let ready = ready && !path.trim().is_empty();
+    let (clicked, cancel) = go_or_cancel(ui, go, ready);
+    let go = (clicked || entered.inner) && ready;
+    (go.then(|| path.trim().into()), go || cancel)
 }

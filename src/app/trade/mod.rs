@@ -10,22 +10,21 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// What is plotted over seconds.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Vertical {
     /// The relative error that estimates claim of themselves; the paper's descent claims none.
-    #[default]
     Claimed,
     /// The error as it was measured.
     Measured,
 }
 
 /// How the pane is shown.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct TradeView {
     /// What is plotted over seconds.
     pub vertical: Vertical,
     /// Seconds that a measurement may take.
-    pub limit: Limit,
+    pub limit: f64,
     /// Where the points were drawn last: place on the screen, curve and point.
     pub places: Vec<(Pos2, usize, usize)>,
 }
@@ -44,13 +43,13 @@ pub struct Measured {
     pub measuring: Option<(Arc<OpenCapture>, Measuring)>,
 }
 
-/// Seconds that a measurement may take.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limit(pub f64);
-
-impl Default for Limit {
+impl Default for TradeView {
     fn default() -> Self {
-        Self(120.0)
+        Self {
+            vertical: Vertical::Claimed,
+            limit: 120.0,
+            places: Vec::new(),
+        }
     }
 }
 
