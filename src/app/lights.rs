@@ -28,21 +28,18 @@ impl Gain {
         let emission = edit.emission.unwrap_or(found);
         let lit = found.cmpgt(Vec3::ZERO);
         let factor = Vec3::select(lit, emission / found, Vec3::ZERO);
-        Self {
-            on: !edit.off,
-            ..Self::by(factor, lit)
-        }
+        Self::by(!edit.off, factor, lit)
     }
 
     /// The gain of a factor on emission; channels that emit nothing take no colour from it.
-    fn by(factor: Vec3, lit: glam::BVec3) -> Self {
+    fn by(on: bool, factor: Vec3, lit: glam::BVec3) -> Self {
         let strength = factor.max_element().max(0.0);
         let color = match strength > 0.0 {
             true => Vec3::select(lit, factor / strength, Vec3::ONE),
             false => Vec3::ONE,
         };
         Self {
-            on: true,
+            on,
             strength,
             color,
         }
@@ -80,10 +77,7 @@ impl Document {
             Some((object, found)) => Gain::of(&self.edits.object(object), found.emission),
             None => {
                 let factor = self.edits.outside();
-                Gain {
-                    on: factor != Vec3::ZERO,
-                    ..Gain::by(factor, glam::BVec3::TRUE)
-                }
+                Gain::by(factor != Vec3::ZERO, factor, glam::BVec3::TRUE)
             }
         }
     }

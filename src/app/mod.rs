@@ -2,7 +2,6 @@
 
 pub mod action;
 pub mod controls;
-pub mod describe;
 pub mod document;
 pub mod insertion;
 pub mod jobs;

@@ -6,7 +6,7 @@ use crate::app::lights::Gain;
 use crate::app::shell::dialogs::Ask;
 use crate::app::shell::sheet::Wanted;
 use crate::app::tool::Clicked;
-use crate::app::trade::choice::Stop;
+use crate::app::trade::Stop;
 use crate::compose::placement::Placement;
 use crate::inverse::settings::Settings;
 use crate::session::command::{Command, Source};

@@ -108,10 +108,8 @@ impl App {
         };
         let size = |k: &Intrinsics| render_size(k.width.max(k.height), needed.pixels);
         let long_side = size(&camera.intrinsics);
-        let file = document
-            .capture()
-            .and_then(|open| open.capture.frames.get(shown.frame));
-        let file = file.filter(|_| needed.composite);
+        let capture = document.capture().filter(|_| needed.composite);
+        let file = capture.and_then(|open| open.capture.frames.get(shown.frame));
         let composite = file.map_or(0, |frame| size(&frame.intrinsics));
         self.jobs.worker.send_view(&ViewRequest {
             camera: match &shown.free {

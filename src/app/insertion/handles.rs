@@ -50,7 +50,7 @@ impl Insertions {
         handles
     }
 
-    /// Where a handle of a placed object is, in scene coordinates: that which rotates it is on the ground beside its file's +x side.
+    /// Where a handle of a placed object is, in scene coordinates; that which rotates it is on the ground by its file's +x side.
     fn place(&self, kind: Kind, object: &Placement, scene: &Scene) -> Option<Vec3> {
         let foot = foot(object, scene)?;
         if kind == Kind::Move {

@@ -5,8 +5,7 @@ use crate::app::controls::labelled;
 use crate::app::panels::plot::{at, decades, hovered, legend};
 use crate::app::request::{Request, Requests};
 use crate::app::theme::{self, Tokens};
-use crate::app::trade::choice::{Stop, offers, stop_at};
-use crate::app::trade::{Measured, TradeView, Vertical};
+use crate::app::trade::{Measured, Stop, TradeView, Vertical, offers, stop_at};
 use crate::app::view::Parts;
 use crate::inverse::settings::{Preset, Settings};
 use crate::session::snapshot::Snapshot;
@@ -30,10 +29,10 @@ pub fn pane(ui: &mut Ui, parts: &mut Parts<'_>, measured: &Measured) {
         return;
     };
     ui.horizontal_wrapped(|ui| {
-        for offer in offers(trade) {
-            let button = ui.small_button(offer.stop.words());
-            if button.on_hover_text(&offer.expected).clicked() {
-                requests.ask(Request::Stop(offer.curve, offer.stop));
+        for (stop, curve, expected) in offers(trade) {
+            let button = ui.small_button(stop.words());
+            if button.on_hover_text(expected).clicked() {
+                requests.ask(Request::Stop(curve, stop));
             }
         }
     });

@@ -2,7 +2,7 @@
 
 use crate::app::state::App;
 use crate::app::task::{Progress, Task};
-use crate::app::trade::choice::{Stop, taken_over};
+use crate::app::trade::{Stop, taken_over};
 use crate::error::Result;
 use crate::inverse::settings::Settings;
 use crate::session::command::Command;

@@ -15,16 +15,12 @@ use std::sync::Arc;
 /// A photograph reduced to a thumbnail's height by taking every n-th pixel.
 fn small(photograph: &Photograph, exposure: f32) -> ColorImage {
     let stride = (photograph.height / (theme::THUMBNAIL as u32 * 2)).max(1) as usize;
-    let (width, height) = (photograph.width as usize, photograph.height as usize);
-    let columns = width.div_ceil(stride);
-    let mut bytes = Vec::with_capacity(columns * height.div_ceil(stride) * 3);
-    for row in photograph.pixels.chunks(width.max(1)).step_by(stride) {
-        for pixel in row.iter().step_by(stride) {
-            bytes.extend(to_srgb8(*pixel, exposure));
-        }
-    }
-    let rows = bytes.len() / (3 * columns.max(1));
-    ColorImage::from_rgb([columns, rows], &bytes)
+    let rows = photograph.pixels.chunks(photograph.width.max(1) as usize);
+    let rows = rows.step_by(stride);
+    let size = [(photograph.width as usize).div_ceil(stride), rows.len()];
+    let pixels = rows.flat_map(|row| row.iter().step_by(stride));
+    let bytes: Vec<u8> = pixels.flat_map(|&p| to_srgb8(p, exposure)).collect();
+    ColorImage::from_rgb(size, &bytes)
 }
 
 /// Draws the strip.

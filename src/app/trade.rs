@@ -1,8 +1,82 @@
-//! Choosing where on the curve to stop.
+//! The trade of speed for exactness of the open capture, read from its results or measured here, and where on it to stop.
 
-use crate::app::trade::Vertical;
+use crate::app::task::Task;
 use crate::inverse::settings::{PARAMETERS, Settings};
+use crate::session::snapshot::OpenCapture;
 use crate::study::trade::{Curve, Point, Trade};
+use egui::Pos2;
+use std::path::Path;
+use std::sync::Arc;
+
+/// What is plotted over seconds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Vertical {
+    /// The relative error that estimates claim of themselves; the paper's descent claims none.
+    Claimed,
+    /// The error as it was measured.
+    Measured,
+}
+
+/// How the pane is shown.
+#[derive(Debug)]
+pub struct TradeView {
+    /// What is plotted over seconds.
+    pub vertical: Vertical,
+    /// Seconds that a measurement may take.
+    pub limit: f64,
+    /// Where the points were drawn last: place on the screen, curve and point.
+    pub places: Vec<(Pos2, usize, usize)>,
+}
+
+/// A measurement, which shows all curves so far.
+pub type Measuring = Task<Arc<Trade>, ()>;
+
+/// The trade of the open capture, as far as it is measured.
+#[derive(Default)]
+pub struct Measured {
+    /// The curves of the open capture, as far as they are known.
+    pub trade: Option<Arc<Trade>>,
+    /// Whether the curves were measured here and are in no file yet.
+    pub unsaved: bool,
+    /// What is being measured, and the measurement under way.
+    pub measuring: Option<(Arc<OpenCapture>, Measuring)>,
+}
+
+impl Default for TradeView {
+    fn default() -> Self {
+        Self {
+            vertical: Vertical::Claimed,
+            limit: 120.0,
+            places: Vec::new(),
+        }
+    }
+}
+
+impl Measured {
+    /// Reads the trade in a folder, if there is one and it is this capture's.
+    ///
+    /// # Errors
+    /// The file is broken, or belongs to another capture.
+    pub fn load(&mut self, folder: &Path, capture: &OpenCapture) -> Result<(), String> {
+        let Some(trade) = Trade::read(folder).map_err(|error| error.to_string())? else {
+            return Ok(());
+        };
+        if trade.hash.as_deref() != Some(capture.hash.as_str()) {
+            return Err(format!(
+                "{}: trade.json belongs to another capture; measure again",
+                folder.display()
+            ));
+        }
+        self.trade = Some(Arc::new(trade));
+        self.unsaved = false;
+        Ok(())
+    }
+
+    /// What is being measured now, in words.
+    pub fn doing(&self) -> Option<String> {
+        self.measuring.as_ref().map(|(_, task)| task.doing())
+    }
+}
 
 /// Claimed errors in percent that are offered.
 const ERRORS: [f64; 7] = [10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1];
@@ -18,17 +92,6 @@ pub enum Stop {
     Seconds(f64),
 }
 
-/// A place to stop at, and the solve that is best there.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Offer {
-    /// When to stop.
-    pub stop: Stop,
-    /// Index of the curve whose parameters to take.
-    pub curve: usize,
-    /// What to expect, in words.
-    pub expected: String,
-}
-
 impl Stop {
     /// "Stop at 1 %" or "Stop at 10 s".
     pub fn words(self) -> String {
@@ -40,7 +103,9 @@ impl Stop {
 }
 
 /// Round errors, each with the preset that reaches it first, and round seconds, each with the most exact preset by then.
-pub fn offers(trade: &Trade) -> Vec<Offer> {
+///
+/// Each is a stop, the index of the curve whose parameters to take, and what to expect in words.
+pub fn offers(trade: &Trade) -> Vec<(Stop, usize, String)> {
     let ends = trade.curves.iter().filter_map(|curve| curve.points.last());
     let last = ends.map(|point| point.seconds).fold(0.0, f64::max);
     let seconds = SECONDS.into_iter().filter(|&seconds| seconds <= last);
@@ -50,7 +115,7 @@ pub fn offers(trade: &Trade) -> Vec<Offer> {
 }
 
 /// The preset that is best at a stop.
-fn offer(trade: &Trade, stop: Stop) -> Option<Offer> {
+fn offer(trade: &Trade, stop: Stop) -> Option<(Stop, usize, String)> {
     // Seconds until a curve claims the error, or its error by then.
     let value = |curve: &Curve| match stop {
         Stop::Error(percent) => {
@@ -70,11 +135,7 @@ fn offer(trade: &Trade, stop: Stop) -> Option<Offer> {
         Stop::Error(_) => format!("{name}: after {best:.1} s"),
         Stop::Seconds(_) => format!("{name}: {} {best:.4}", trade.measure.label()),
     };
-    Some(Offer {
-        stop,
-        curve,
-        expected,
-    })
+    Some((stop, curve, expected))
 }
 
 /// The stop at a point of a curve, rounded up to two digits so that a solve reaches it.
