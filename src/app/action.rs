@@ -1,6 +1,6 @@
 //! Everything that can be asked of the window, once: menus, palette, shortcuts and the window of keys read this table.
 
-use crate::app::choices::choices;
+use crate::app::controls::choices;
 use egui::{Key, KeyboardShortcut, Modifiers};
 
 /// One row: variant, menu, what it needs, text, tooltip, shortcut.
@@ -111,9 +111,9 @@ actions! {
     SolveOn, Solve, CurrentObjects, "Solve on with pinned values", "Holds the pinned values and solves the rest on from the last stage", ctrl_shift(Key::R);
     ResetMaterial, Edit, CurrentObjects, "Reset material", "Puts the selected object back to what was found", None;
     ResetEdits, Edit, CurrentObjects, "Reset all materials", "Puts all objects and the light from outside back to what was found", None;
-    JoinObjects, Edit, Nothing, "Join objects", "Makes one object of those that are chosen; Ctrl and a click choose more than one", ctrl(Key::J);
-    CutOut, Edit, Nothing, "Cut out by lasso…", "A line drawn around faces in the 3D view makes them an object of their own, of the chosen objects alone where any are", ctrl_shift(Key::X);
-    RenameObject, Edit, Nothing, "Rename object", "Puts the name of the selected object up for change, in the table of objects", key(Key::F2);
+    JoinObjects, Edit, CurrentObjects, "Join objects", "Makes one object of those that are chosen; Ctrl and a click choose more than one", ctrl(Key::J);
+    CutOut, Edit, CurrentObjects, "Cut out by lasso…", "A line drawn around faces in the 3D view makes them an object of their own, of the chosen objects alone where any are", ctrl_shift(Key::X);
+    RenameObject, Edit, CurrentObjects, "Rename object", "Puts the name of the selected object up for change, in the table of objects", key(Key::F2);
     Deselect, Edit, Nothing, "Deselect", "Selects nothing and ends placing", key(Key::Escape);
 
     RunPause, Solve, Capture, "Run / Pause", "Starts, holds or goes on with the solve", key(Key::Space);

@@ -1,6 +1,6 @@
-//! Controls that several panes share, each with a name for those who do not see it.
+//! Controls that several panes share, each with a name for those who do not see it, and what is chosen from lists.
 
-use egui::{Button, ComboBox, DragValue, Key, Response, Role, TextEdit, Ui, WidgetInfo};
+use egui::{Button, ComboBox, DragValue, Key, Response, Role, TextEdit, Ui, Widget, WidgetInfo};
 use glam::{DVec3, Vec3};
 
 /// A response with a name that is read out.
@@ -13,6 +13,12 @@ pub fn named(response: Response, role: Role, name: &str) -> Response {
 pub fn switched(response: Response, role: Role, on: bool, name: &str) -> Response {
     response.widget_info(|| WidgetInfo::selected(role, true, on, name));
     response
+}
+
+/// A control with a label before it.
+pub fn labelled(ui: &mut Ui, label: &str, control: impl Widget) -> Response {
+    let label = ui.label(label);
+    ui.add(control).labelled_by(label.id)
 }
 
 /// Three numbers for a point of the capture, of which one is dragged by `speed` a point of the screen; true when changed.
@@ -47,9 +53,8 @@ pub fn path_field(
     hint: &str,
     width: f32,
 ) -> (Response, bool) {
-    let label = ui.label(label);
     let field = TextEdit::singleline(path).hint_text(hint);
-    let response = ui.add(field.desired_width(width)).labelled_by(label.id);
+    let response = labelled(ui, label, field.desired_width(width));
     let enter = ui.input(|input| input.key_pressed(Key::Enter));
     let entered = response.lost_focus() && enter;
     (response, entered)
@@ -86,3 +91,42 @@ pub fn choose<T: Choice>(ui: &mut Ui, name: &str, width: f32, value: &mut T) {
     });
     named(list.response, Role::ComboBox, name);
 }
+
+/// Declares an enum of what a person chooses from a list: its values in the order shown, each as variant, name, what it is.
+macro_rules! choices {
+    ($(#[$meta:meta])* $name:ident { $($variant:ident, $text:literal, $help:literal;)* }) => {
+        $(#[$meta])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+        pub enum $name { $(#[doc = $help] $variant,)* }
+
+        impl $name {
+            /// All, in the order shown.
+            pub const ALL: [Self; [$($text),*].len()] = [$(Self::$variant),*];
+
+            /// The name shown.
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$variant => $text,)* }
+            }
+
+            /// What it is, in a sentence.
+            pub fn help(self) -> &'static str {
+                match self { $(Self::$variant => $help,)* }
+            }
+
+            /// The next in order; the first after the last.
+            pub fn next(self) -> Self {
+                Self::ALL[(self as usize + 1) % Self::ALL.len()]
+            }
+        }
+
+        impl $crate::app::controls::Choice for $name {
+            const ALL: &'static [Self] = &Self::ALL;
+
+            fn name_and_help(self) -> (&'static str, &'static str) {
+                (self.name(), self.help())
+            }
+        }
+    };
+}
+
+pub(crate) use choices;

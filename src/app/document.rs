@@ -121,18 +121,12 @@ impl Document {
 
     /// Records a step where something changed; to be called while no button is down, so that a drag is one step.
     pub fn record(&mut self) {
-        let step = self.step();
-        self.history.record(&step);
+        self.history.record(&self.step());
     }
 
     /// Takes the last step back, or makes the last undone step again.
     pub fn undo_or_redo(&mut self, undo: bool) {
-        let mut step = self.step();
-        let stepped = match undo {
-            true => self.history.undo(&mut step),
-            false => self.history.redo(&mut step),
-        };
-        if stepped {
+        if let Some(step) = self.history.step(&self.step(), undo) {
             self.insertions.replace(step.inserted);
             self.regroups = step.regroups;
             self.edits = step.edits;

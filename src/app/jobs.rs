@@ -1,8 +1,8 @@
 //! What runs beside the window: the worker, and work on threads of its own.
 
-use crate::app::batch::Batch;
 use crate::app::shell::dialogs::Dialogs;
 use crate::app::shell::notices::Notices;
+use crate::app::shell::status::Batch;
 use crate::app::task::Task;
 use crate::app::trade::Measured;
 use crate::app::worker::Worker;

@@ -1,6 +1,6 @@
 //! The panes and where they are: a tree of tiles that can be moved, closed, brought back and reset.
 
-use crate::app::choices::choices;
+use crate::app::controls::choices;
 use crate::app::picture::quantity::Quantity;
 use egui_tiles::{Container, Tile, TileId, Tiles, Tree};
 use serde::{Deserialize, Serialize};

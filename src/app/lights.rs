@@ -28,21 +28,18 @@ impl Gain {
         let emission = edit.emission.unwrap_or(found);
         let lit = found.cmpgt(Vec3::ZERO);
         let factor = Vec3::select(lit, emission / found, Vec3::ZERO);
-        Self {
-            on: !edit.off,
-            ..Self::by(factor, lit)
-        }
+        Self::by(!edit.off, factor, lit)
     }
 
     /// The gain of a factor on emission; channels that emit nothing take no colour from it.
-    fn by(factor: Vec3, lit: glam::BVec3) -> Self {
+    fn by(on: bool, factor: Vec3, lit: glam::BVec3) -> Self {
         let strength = factor.max_element().max(0.0);
         let color = match strength > 0.0 {
             true => Vec3::select(lit, factor / strength, Vec3::ONE),
             false => Vec3::ONE,
         };
         Self {
-            on: true,
+            on,
             strength,
             color,
         }
@@ -80,10 +77,7 @@ impl Document {
             Some((object, found)) => Gain::of(&self.edits.object(object), found.emission),
             None => {
                 let factor = self.edits.outside();
-                Gain {
-                    on: factor != Vec3::ZERO,
-                    ..Gain::by(factor, glam::BVec3::TRUE)
-                }
+                Gain::by(factor != Vec3::ZERO, factor, glam::BVec3::TRUE)
             }
         }
     }
@@ -133,24 +127,15 @@ impl Document {
 pub fn place(scene: &Scene, object: u32, camera: &Camera) -> Option<String> {
     let triangles = &scene.objects.get(object as usize)?.triangles;
     let stride = triangles.len().div_ceil(SAMPLED).max(1);
-    let (mut sum, mut count) = (Vec3::ZERO, 0.0);
-    for &triangle in triangles.iter().step_by(stride) {
-        let corners = scene.triangles.get(triangle as usize)?;
-        sum += (corners.iter())
-            .filter_map(|&corner| scene.positions.get(corner as usize))
-            .sum::<Vec3>();
-        count += 3.0;
-    }
-    let middle = sum / count;
+    let sampled = triangles.iter().step_by(stride);
+    let corners = 3.0 * sampled.len() as f32;
+    let sums = sampled.map(|&triangle| scene.corners(triangle).iter().sum::<Vec3>());
+    let middle = sums.sum::<Vec3>() / corners;
     let k = &camera.intrinsics;
-    let pixel = camera.project(middle);
     let part = |at: f32, whole: u32, words: [&'static str; 3]| {
         words[((at / whole as f32 * 3.0) as usize).min(2)]
     };
-    let inside = pixel.filter(|p| {
-        p.cmpge(glam::Vec2::ZERO).all() && p.x < k.width as f32 && p.y < k.height as f32
-    });
-    Some(match inside {
+    Some(match camera.project(middle) {
         Some(at) => {
             let height = part(at.y, k.height, ["high", "", "low"]);
             let side = part(at.x, k.width, ["left", "middle", "right"]);

@@ -1,10 +1,7 @@
 //! The window: panes over a session, drawn by egui and wgpu. Talks to the worker through [`worker::Connection`].
 
 pub mod action;
-pub mod batch;
-mod choices;
 pub mod controls;
-pub mod describe;
 pub mod document;
 pub mod insertion;
 pub mod jobs;

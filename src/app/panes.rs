@@ -1,11 +1,13 @@
 //! Draws the panes in their tiles. Each borrows what it shows; what it asks for is done once it is drawn.
 
+use crate::app::jobs::Jobs;
 use crate::app::layout::Pane;
 use crate::app::picture::quantity::Quantity;
 use crate::app::request::Requests;
 use crate::app::state::App;
+use crate::app::view::Parts;
 use crate::app::{model, panels, picture, theme};
-use egui::{Color32, Stroke, Visuals};
+use egui::{Color32, ScrollArea, Stroke, Ui, Visuals};
 use egui_tiles::{Behavior, SimplificationOptions, TabState, TileId, Tiles, UiResponse};
 
 /// Draws panes for the tree.
@@ -18,51 +20,69 @@ pub struct Panes<'a> {
     pub front: Vec<TileId>,
 }
 
+/// Draws a pane of words and numbers.
+fn words(ui: &mut Ui, pane: Pane, parts: &mut Parts<'_>, jobs: &Jobs) {
+    use panels::*;
+    let document = parts.document;
+    let progress = &document.snapshot.progress;
+    let scrolled = ScrollArea::vertical().auto_shrink(false);
+    match (pane, document.capture()) {
+        (Pane::Loss, _) => loss::pane(ui, progress),
+        (Pane::Trade, _) => trade::pane(ui, parts, &jobs.measured),
+        (Pane::Log, _) => report::log(ui, &jobs.notices),
+        (Pane::Settings, _) => {
+            let settings = &document.settings;
+            scrolled.show(ui, |ui| settings::pane(ui, settings, parts.requests));
+        }
+        (Pane::Stages, _) => {
+            scrolled.show(ui, |ui| report::stages(ui, progress));
+        }
+        (_, None) => {
+            ui.weak(document.nothing_open());
+        }
+        (Pane::Objects, Some(capture)) => {
+            let (objects, view) = (&capture.scene.objects, &mut *parts.view);
+            let (selection, table) = (&view.selection, &mut view.panels.objects);
+            objects::pane(ui, document, objects, selection, table, parts.requests);
+        }
+        (Pane::Material | Pane::Lights, _) if !document.objects_are_current() => {
+            ui.weak("Reading the mesh again…");
+        }
+        (Pane::Material, Some(capture)) => {
+            scrolled.show(ui, |ui| material::pane(ui, parts, &capture.scene));
+        }
+        (Pane::Lights, Some(capture)) => {
+            scrolled.show(ui, |ui| lights::pane(ui, parts, &capture.scene));
+        }
+        (Pane::Insert, Some(capture)) => {
+            scrolled.show(ui, |ui| insert::pane(ui, parts, &capture.scene));
+        }
+        (_, Some(capture)) => {
+            scrolled.show(ui, |ui| report::capture(ui, capture, progress));
+        }
+    }
+}
+
 impl Behavior<Pane> for Panes<'_> {
-    fn pane_ui(&mut self, ui: &mut egui::Ui, _tile: TileId, pane: &mut Pane) -> UiResponse {
-        let (document, view, jobs) = (&self.app.document, &mut self.app.view, &self.app.jobs);
-        let requests = &mut *self.requests;
+    fn pane_ui(&mut self, ui: &mut Ui, _tile: TileId, pane: &mut Pane) -> UiResponse {
+        let (jobs, whole) = (&self.app.jobs, ui.max_rect());
+        let parts = &mut Parts {
+            document: &self.app.document,
+            view: &mut self.app.view,
+            requests: self.requests,
+        };
         // Panes that fill themselves get no background: a software renderer pays for every layer.
         match *pane {
-            Pane::Picture(Quantity::Composite) => {
-                picture::hero::pane(ui, document, view, requests);
-            }
-            Pane::Picture(quantity) => {
-                picture::canvas::pane(ui, document, view, requests, quantity);
-            }
-            Pane::Compare => picture::wipe::pane(ui, document, view, requests),
-            Pane::Model => model::pane::pane(ui, document, view, requests),
+            Pane::Picture(Quantity::Composite) => picture::hero::pane(ui, parts),
+            Pane::Picture(quantity) => picture::canvas::pane(ui, parts, whole, quantity),
+            Pane::Compare => picture::wipe::pane(ui, parts),
+            Pane::Model => model::pane::pane(ui, parts),
             other => {
                 let panel = theme::tokens(ui).panel;
-                ui.painter().rect_filled(ui.max_rect(), 0.0, panel);
-                let selected = &view.selection;
+                ui.painter().rect_filled(whole, 0.0, panel);
                 egui::Frame::NONE.inner_margin(theme::GAP).show(ui, |ui| {
                     ui.take_available_space();
-                    use panels::*;
-                    let own = &mut view.panels;
-                    match other {
-                        Pane::Objects => {
-                            objects::pane(ui, document, selected, &mut own.objects, requests);
-                        }
-                        Pane::Material => material::pane(ui, document, selected.object, requests),
-                        Pane::Lights => {
-                            let camera = view.shown.camera(document);
-                            lights::pane(ui, document, selected.object, camera, requests);
-                        }
-                        Pane::Insert => {
-                            let tool = &view.tool;
-                            insert::pane(ui, document, tool, &mut own.adding, requests);
-                        }
-                        Pane::Settings => settings::pane(ui, &document.settings, requests),
-                        Pane::Capture => capture::pane(ui, document),
-                        Pane::Loss => loss::pane(ui, &document.snapshot.progress),
-                        Pane::Stages => stages::pane(ui, &document.snapshot.progress),
-                        Pane::Trade => {
-                            let measured = &jobs.measured;
-                            trade::pane(ui, document, measured, &mut own.trade, requests);
-                        }
-                        _ => log::pane(ui, &jobs.notices),
-                    }
+                    words(ui, other, parts, jobs);
                 });
             }
         }

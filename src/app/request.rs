@@ -2,18 +2,17 @@
 //! the document or what runs; `perform` does it.
 
 use crate::app::action::Action;
-use crate::app::controls::named;
 use crate::app::lights::Gain;
 use crate::app::shell::dialogs::Ask;
 use crate::app::shell::sheet::Wanted;
 use crate::app::tool::Clicked;
-use crate::app::trade::choice::Stop;
+use crate::app::trade::Stop;
 use crate::compose::placement::Placement;
 use crate::inverse::settings::Settings;
 use crate::session::command::{Command, Source};
 use crate::session::edits::ObjectEdit;
 use crate::session::snapshot::Level;
-use egui::{Button, Response, Role, Ui};
+use egui::{Button, Response, Ui};
 use std::collections::HashSet;
 use std::path::PathBuf;
 
@@ -134,10 +133,5 @@ impl Requests {
             self.ask(action);
         }
         response
-    }
-
-    /// Draws such a button that is named by its action, for a text that cannot be read out.
-    pub fn named_button(&mut self, ui: &mut Ui, action: Action, button: Button<'_>) -> Response {
-        named(self.button(ui, action, button), Role::Button, action.text())
     }
 }

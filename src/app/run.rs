@@ -14,6 +14,9 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+/// Whether the window has been opened.
+static OPENED: AtomicBool = AtomicBool::new(false);
+
 /// Opens the window and returns when it is closed. With no `start` it shows the start page.
 ///
 /// # Errors
@@ -30,25 +33,19 @@ pub fn run(start: Option<Start>, settings: Settings) -> Result<()> {
         dithering: false,
         ..Default::default()
     };
-    let opened = Arc::new(AtomicBool::new(false));
-    let create: eframe::AppCreator<'_> = {
-        let opened = opened.clone();
-        Box::new(move |cc| {
-            let window = window(cc, start, settings)?;
-            opened.store(true, Ordering::Relaxed);
-            Ok(Box::new(window))
-        })
-    };
+    let create: eframe::AppCreator<'_> = Box::new(|cc| {
+        let window = window(cc, start, settings)?;
+        OPENED.store(true, Ordering::Relaxed);
+        Ok(Box::new(window))
+    });
 
     // A missing X library makes the window library panic, which is kept quiet until the window is open.
     let before: Arc<dyn Fn(&std::panic::PanicHookInfo<'_>) + Send + Sync> =
         Arc::from(std::panic::take_hook());
-    std::panic::set_hook(Box::new({
-        let (opened, before) = (opened.clone(), before.clone());
-        move |info| {
-            if opened.load(Ordering::Relaxed) {
-                before(info);
-            }
+    let loud = before.clone();
+    std::panic::set_hook(Box::new(move |info| {
+        if OPENED.load(Ordering::Relaxed) {
+            loud(info);
         }
     }));
     let ended = catch_unwind(AssertUnwindSafe(|| {
@@ -64,7 +61,7 @@ pub fn run(start: Option<Start>, settings: Settings) -> Result<()> {
             "install a graphics driver (a software one will do, such as Mesa's for Vulkan)",
         )),
         Ok(Err(error)) => Err(no_window(&error.to_string())),
-        Err(panic) if opened.load(Ordering::Relaxed) => resume_unwind(panic),
+        Err(panic) if OPENED.load(Ordering::Relaxed) => resume_unwind(panic),
         Err(panic) => Err(no_window(panic_message(panic.as_ref()))),
     }
 }
@@ -95,7 +92,9 @@ fn window(
         Start::Capture(source, _) => source,
         Start::Results(folder) => Source::Folder(folder),
     });
-    Ok(Window::new(cc, app, kept).paced(pace))
+    let mut window = Window::new(cc, app, kept);
+    window.pace = Some(pace);
+    Ok(window)
 }
 
 /// The reason in one line.

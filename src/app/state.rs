@@ -2,7 +2,6 @@
 
 use crate::app::document::Document;
 use crate::app::jobs::Jobs;
-use crate::app::picture::look::Look;
 use crate::app::preferences::Preferences;
 use crate::app::view::ViewState;
 use crate::app::worker::{Connection, Worker};
@@ -24,16 +23,11 @@ pub struct App {
 impl App {
     /// A window on a session.
     pub fn new(connection: Box<dyn Connection>, preferences: Preferences) -> Self {
-        let look = Look {
-            tone: preferences.tone,
-            ..Look::default()
-        };
+        let mut view = ViewState::default();
+        view.look.tone = preferences.tone;
         Self {
             document: Document::default(),
-            view: ViewState {
-                look,
-                ..ViewState::default()
-            },
+            view,
             jobs: Jobs::new(Worker::new(connection)),
             preferences,
         }

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Work under way. `N` is what it shows on the way, `E` what it ends with. Dropping it asks it to end.
 pub struct Task<N, E> {
@@ -17,20 +17,20 @@ pub struct Progress<N> {
     cancelled: AtomicBool,
     doing: Mutex<String>,
     newest: Mutex<Option<N>>,
-    wake: Box<dyn Fn() + Send + Sync>,
+    ctx: egui::Context,
 }
 
 impl<N> Progress<N> {
     /// Says what is done now, in words.
     pub fn say(&self, doing: impl Into<String>) {
-        *self.doing.lock().unwrap_or_else(PoisonError::into_inner) = doing.into();
-        (self.wake)();
+        *locked(&self.doing) = doing.into();
+        self.ctx.request_repaint();
     }
 
     /// Shows something new in place of what was shown before.
     pub fn show(&self, newest: N) {
-        *self.newest.lock().unwrap_or_else(PoisonError::into_inner) = Some(newest);
-        (self.wake)();
+        *locked(&self.newest) = Some(newest);
+        self.ctx.request_repaint();
     }
 
     /// Whether it is to end.
@@ -40,20 +40,20 @@ impl<N> Progress<N> {
 }
 
 impl<N: Send + 'static, E: Send + 'static> Task<N, E> {
-    /// Begins; `wake` is called whenever there is something new.
+    /// Begins; the window is painted again whenever there is something new.
     ///
     /// # Errors
     /// The system grants no thread.
     pub fn begin(
         name: &'static str,
-        wake: impl Fn() + Send + Sync + 'static,
+        ctx: &egui::Context,
         work: impl FnOnce(&Progress<N>) -> Result<E> + Send + 'static,
     ) -> Result<Self> {
         let progress = Arc::new(Progress {
             cancelled: AtomicBool::new(false),
             doing: Mutex::default(),
             newest: Mutex::new(None),
-            wake: Box::new(wake),
+            ctx: ctx.clone(),
         });
         let shared = progress.clone();
         let (sender, end) = channel();
@@ -66,7 +66,7 @@ impl<N: Send + 'static, E: Send + 'static> Task<N, E> {
                 };
                 // Nobody hears it where the task was dropped.
                 let _ = sender.send(end);
-                (shared.wake)();
+                shared.ctx.request_repaint();
             })
             .map_err(|error| Error::new(name, error, "close other programs and try again"))?;
         Ok(Self { progress, end })
@@ -81,20 +81,22 @@ impl<N, E> Task<N, E> {
 
     /// What it is at, in words.
     pub fn doing(&self) -> String {
-        let doing = self.progress.doing.lock();
-        doing.unwrap_or_else(PoisonError::into_inner).clone()
+        locked(&self.progress.doing).clone()
     }
 
     /// What it showed since the last call.
     pub fn newest(&self) -> Option<N> {
-        let newest = self.progress.newest.lock();
-        newest.unwrap_or_else(PoisonError::into_inner).take()
+        locked(&self.progress.newest).take()
     }
 
     /// How it ended, once it has; to be asked after [`Task::newest`].
     pub fn end(&mut self) -> Option<std::result::Result<E, String>> {
         self.end.try_recv().ok()
     }
+}
+
+fn locked<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl<N, E> Drop for Task<N, E> {

@@ -1,10 +1,13 @@
 //! The active tool: what the next click or drag in a view does instead of selecting.
 
+use crate::app::insertion::Insertions;
 use crate::app::insertion::handles::Handle;
 use crate::app::insertion::transform::Transform;
+use crate::compose::placement::Placement;
 use crate::scene::Scene;
 use crate::scene::geometry::{Hit, Ray};
-use glam::DVec3;
+use egui::{Pos2, Response};
+use glam::{DVec3, Vec3};
 
 /// What the next click is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,6 +58,39 @@ impl Tool {
     /// Whether the next click does something else than select.
     pub fn is_active(&self) -> bool {
         self.placing || self.dragged.is_some() || self.pick.is_some() || self.transform.is_some()
+    }
+
+    /// Follows the pointer over a view of the scene: whether it has hold of an inserted object, and where that is put. A drag that
+    /// `started` may take a handle. `project` maps to the screen; `aim` gives a point's ray and the surface that it meets.
+    pub fn follow(
+        &mut self,
+        response: &Response,
+        started: bool,
+        insertions: &Insertions,
+        scene: &Scene,
+        project: impl Fn(Vec3) -> Option<Pos2>,
+        aim: impl Fn(Pos2) -> (Ray, Option<DVec3>),
+    ) -> (bool, Option<(usize, Placement)>) {
+        let press = response.ctx.input(|input| input.pointer.press_origin());
+        if let Some(press) = press.filter(|_| started) {
+            self.dragged = insertions.handle_at(scene, press, &project);
+        }
+        if response.drag_stopped() {
+            self.dragged = None;
+        }
+        if let Some((pointer, transform)) = response.hover_pos().zip(self.transform.as_mut()) {
+            let (ray, surface) = aim(pointer);
+            let placed = transform.placed(scene, pointer, &ray, surface, project);
+            return (true, placed);
+        }
+        let pointer = (response.interact_pointer_pos()).filter(|_| response.dragged());
+        let Some((pointer, handle)) = pointer.zip(self.dragged) else {
+            return (false, None);
+        };
+        let (ray, surface) = aim(pointer);
+        let modifiers = response.ctx.input(|input| input.modifiers);
+        let placed = insertions.dragged(handle, scene, &ray, surface, modifiers);
+        (true, placed)
     }
 }
 

@@ -45,29 +45,17 @@ impl<T: Clone + PartialEq> History<T> {
         !self.future.is_empty()
     }
 
-    /// Takes the last step back; false where there is none.
-    pub fn undo(&mut self, value: &mut T) -> bool {
+    /// Takes the last step back, or makes the last step that was taken back again: the value after it, where there is such a step.
+    pub fn step(&mut self, value: &T, back: bool) -> Option<T> {
         self.record(value);
-        let (past, future) = (&mut self.past, &mut self.future);
-        step(value, &mut self.current, past, future)
+        let (from, to) = match back {
+            true => (&mut self.past, &mut self.future),
+            false => (&mut self.future, &mut self.past),
+        };
+        let next = from.pop()?;
+        to.push(std::mem::replace(&mut self.current, next.clone()));
+        Some(next)
     }
-
-    /// Makes the last step that was taken back again; false where there is none.
-    pub fn redo(&mut self, value: &mut T) -> bool {
-        self.record(value);
-        let (past, future) = (&mut self.past, &mut self.future);
-        step(value, &mut self.current, future, past)
-    }
-}
-
-/// Goes to the newest value of `from`, leaving the current one in `to`.
-fn step<T: Clone>(value: &mut T, current: &mut T, from: &mut Vec<T>, to: &mut Vec<T>) -> bool {
-    let Some(next) = from.pop() else {
-        return false;
-    };
-    to.push(std::mem::replace(current, next));
-    value.clone_from(current);
-    true
 }
 
 #[cfg(test)]
@@ -77,28 +65,20 @@ mod tests {
     #[test]
     fn steps_go_back_and_forth_and_a_new_one_ends_the_future() {
         let mut history = History::<i32>::default();
-        let mut value = 0;
-        for step in 1..=3 {
-            value = step;
-            history.record(&value);
-            history.record(&value);
+        for step in [1, 2, 3, 3] {
+            history.record(&step);
         }
-        assert!(history.undo(&mut value) && value == 2);
-        assert!(history.undo(&mut value) && value == 1);
-        assert!(history.redo(&mut value) && value == 2);
-        value = 9;
-        history.record(&value);
-        assert!(!history.redo(&mut value) && value == 9);
-        assert!(history.undo(&mut value) && value == 2);
-        assert!(history.undo(&mut value) && history.undo(&mut value) && value == 0);
-        assert!(!history.undo(&mut value) && !history.can_undo() && history.can_redo());
-    }
-
-    #[test]
-    fn what_was_not_yet_recorded_is_undone_first() {
-        let mut history = History::<i32>::default();
-        let mut value = 5;
-        assert!(history.undo(&mut value) && value == 0);
-        assert!(history.redo(&mut value) && value == 5);
+        assert_eq!(history.step(&3, true), Some(2));
+        assert_eq!(history.step(&2, true), Some(1));
+        assert_eq!(history.step(&1, false), Some(2));
+        // What was not recorded yet is taken back first.
+        assert_eq!(history.step(&9, false), None);
+        for before in [2, 1, 0] {
+            assert_eq!(history.step(&history.current.clone(), true), Some(before));
+        }
+        assert!(!history.can_undo() && history.can_redo());
+        assert_eq!(history.step(&0, true), None);
+        assert_eq!(history.step(&5, true), Some(0));
+        assert_eq!(history.step(&0, false), Some(5));
     }
 }

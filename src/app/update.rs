@@ -108,10 +108,8 @@ impl App {
         };
         let size = |k: &Intrinsics| render_size(k.width.max(k.height), needed.pixels);
         let long_side = size(&camera.intrinsics);
-        let file = document
-            .capture()
-            .and_then(|open| open.capture.frames.get(shown.frame));
-        let file = file.filter(|_| needed.composite);
+        let capture = document.capture().filter(|_| needed.composite);
+        let file = capture.and_then(|open| open.capture.frames.get(shown.frame));
         let composite = file.map_or(0, |frame| size(&frame.intrinsics));
         self.jobs.worker.send_view(&ViewRequest {
             camera: match &shown.free {
@@ -126,22 +124,17 @@ impl App {
     }
 
     fn answered(&mut self, ask: Ask, answer: Option<PathBuf>, ctx: &egui::Context) {
-        let Some(path) = answer else {
-            self.say(
-                Level::Info,
-                "nothing was chosen; where no file dialog opens, type the path instead",
-            );
-            match ask {
-                Ask::Capture => self.view.shell.start.asked = true,
-                Ask::Object => self.view.bring_forward(Pane::Insert),
-                Ask::SaveFolder | Ask::ExportFile => {}
-            }
-            return;
-        };
-        match ask {
-            Ask::Capture => self.open_path(&path, ctx),
-            Ask::SaveFolder | Ask::ExportFile => self.view.shell.sheet.chosen(ask, path),
-            Ask::Object => self.insert(path),
+        if answer.is_none() {
+            let hint = "nothing was chosen; where no file dialog opens, type the path instead";
+            self.say(Level::Info, hint);
+        }
+        match (ask, answer) {
+            (Ask::Capture, Some(path)) => self.open_path(&path, ctx),
+            (Ask::Capture, None) => self.view.shell.start.asked = true,
+            (Ask::Object, Some(path)) => self.insert(path),
+            (Ask::Object, None) => self.view.bring_forward(Pane::Insert),
+            (_, Some(path)) => self.view.shell.sheet.chosen(ask, path),
+            (_, None) => {}
         }
     }
 }

@@ -5,11 +5,10 @@ use crate::app::insertion::Adding;
 use crate::app::layout::Pane;
 use crate::app::model::view::ModelView;
 use crate::app::panels::objects::ObjectsTable;
-use crate::app::picture::compare::Compare;
 use crate::app::picture::drawn::{Derived, Drawn};
-use crate::app::picture::look::Look;
-use crate::app::picture::needed::Needed;
+use crate::app::picture::look::{Compare, Look};
 use crate::app::picture::quantity::Quantity;
+use crate::app::request::Requests;
 use crate::app::selection::Selection;
 use crate::app::shell::Shell;
 use crate::app::shown::Shown;
@@ -43,6 +42,16 @@ pub struct ViewState {
     pub layout: LayoutRequest,
 }
 
+/// What panes of pictures borrow.
+pub struct Parts<'a> {
+    /// What is shown.
+    pub document: &'a Document,
+    /// How it is shown.
+    pub view: &'a mut ViewState,
+    /// What the pane asks for.
+    pub requests: &'a mut Requests,
+}
+
 /// How the panes of words and numbers are shown.
 #[derive(Default)]
 pub struct PanelsView {
@@ -52,6 +61,31 @@ pub struct PanelsView {
     pub adding: Adding,
     /// The plot of the trade.
     pub trade: TradeView,
+}
+
+/// What the panes of a pass need.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Needed {
+    /// The most pixels that a pane shows along a side.
+    pub pixels: f32,
+    /// Whether a pane shows a composite.
+    pub composite: bool,
+    /// Whether a pane shows the re-render, or what is made of it.
+    pub render: bool,
+    /// Whether the light of each lamp is asked for apart.
+    pub layers: bool,
+    /// Whether a pane shows the irradiance.
+    pub irradiance: bool,
+}
+
+impl Needed {
+    /// Notes that a picture is shown.
+    pub fn note(&mut self, quantity: Quantity) {
+        use Quantity::{Composite, Error, Irradiance, Naive, NaiveEstimate, Render};
+        self.composite |= matches!(quantity, Composite | Naive | NaiveEstimate);
+        self.render |= matches!(quantity, Render | Error | Irradiance);
+        self.irradiance |= quantity == Irradiance;
+    }
 }
 
 /// What is asked of the layout in this pass.

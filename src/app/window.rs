@@ -4,13 +4,13 @@ use crate::app::layout::{self, Pane, Workspace};
 use crate::app::pace::Pace;
 use crate::app::panes::Panes;
 use crate::app::picture::inspect;
-use crate::app::picture::needed::Needed;
 use crate::app::preferences::Preferences;
 use crate::app::request::{Request, Requests};
 use crate::app::shell::{
     alignment, files, keys, menu, palette, sessions, start, status, thumbnails, toolbar,
 };
 use crate::app::state::App;
+use crate::app::view::{Needed, Parts};
 use crate::app::{action, model, picture, theme};
 use crate::say;
 use egui::{CentralPanel, Frame, Margin, Panel, Ui};
@@ -28,7 +28,8 @@ pub struct Window {
     workspace: Workspace,
     kept: Option<PathBuf>,
     saved: Preferences,
-    pace: Option<Arc<Pace>>,
+    /// What is told of every pass.
+    pub pace: Option<Arc<Pace>>,
 }
 
 impl Window {
@@ -53,47 +54,34 @@ impl Window {
         }
     }
 
-    /// The same, telling `pace` of every pass.
-    pub fn paced(self, pace: Arc<Pace>) -> Self {
-        Self {
-            pace: Some(pace),
-            ..self
-        }
-    }
-
     fn bars(&mut self, ui: &mut Ui, requests: &mut Requests) {
         let start_page = self.app.shows_start_page();
         let (app, tree) = (&mut self.app, &mut self.tree);
-        let (document, view) = (&app.document, &mut app.view);
-        let (look, shown, shell) = (&mut view.look, &view.shown, &mut view.shell);
-        bar(ui, Panel::top("menu"), 6, 2).show(ui, |ui| {
-            let name = document.capture().map(|open| open.name.as_str());
-            menu::bar(ui, name, app.preferences.workspace, tree, requests);
-        });
-        bar(ui, Panel::top("tools"), 8, 4)
-            .show(ui, |ui| toolbar::bar(ui, document, shown, look, requests));
-        app.preferences.tone = look.tone;
-        let continued = document.snapshot.continued.as_ref();
-        if let Some(name) = continued.filter(|_| !shell.sessions.closed && !start_page) {
-            bar(ui, Panel::top("session").exact_size(sessions::LINE), 8, 4).show(ui, |ui| {
-                sessions::line(ui, name, &mut shell.sessions, requests)
-            });
+        let parts = &mut Parts {
+            document: &app.document,
+            view: &mut app.view,
+            requests,
+        };
+        let workspace = app.preferences.workspace;
+        bar(ui, Panel::top("menu"), 6, 2).show(ui, |ui| menu::bar(ui, parts, workspace, tree));
+        bar(ui, Panel::top("tools"), 8, 4).show(ui, |ui| toolbar::bar(ui, parts));
+        app.preferences.tone = parts.view.look.tone;
+        let continued = parts.document.snapshot.continued.as_ref();
+        let hidden = parts.view.shell.sessions.closed || start_page;
+        if let Some(name) = continued.filter(|_| !hidden) {
+            let line = Panel::top("session").exact_size(theme::ROW + 8.0);
+            bar(ui, line, 8, 4).show(ui, |ui| sessions::line(ui, parts, name));
         }
-        bar(ui, Panel::bottom("status").exact_size(24.0), 8, 2).show(ui, |ui| {
-            let batch = app.jobs.batch.as_ref();
-            status::bar(ui, document, batch, &mut shell.memory, requests);
-        });
+        let (status, batch) = (Panel::bottom("status"), app.jobs.batch.as_ref());
+        bar(ui, status.exact_size(24.0), 8, 2).show(ui, |ui| status::bar(ui, parts, batch));
         if start_page {
             return;
         }
         bar(ui, Panel::bottom("inspector").exact_size(22.0), 8, 2)
-            .show(ui, |ui| inspect::bar(ui, document, view));
-        if app.preferences.thumbnails && document.frames() > 0 {
+            .show(ui, |ui| inspect::bar(ui, parts.document, parts.view));
+        if app.preferences.thumbnails && parts.document.frames() > 0 {
             let strip = Panel::bottom("thumbnails").exact_size(theme::THUMBNAIL + 18.0);
-            bar(ui, strip, 8, 4).show(ui, |ui| {
-                let (exposure, strip) = (view.look.exposure, &mut view.shell.thumbnails);
-                thumbnails::strip(ui, document, &view.shown, exposure, strip, requests);
-            });
+            bar(ui, strip, 8, 4).show(ui, |ui| thumbnails::strip(ui, parts));
         }
     }
 
@@ -116,11 +104,15 @@ impl Window {
         let panel = CentralPanel::no_frame().frame(Frame::NONE.fill(fill));
         panel.show(ui, |ui| {
             if self.app.shows_start_page() {
-                let (document, shell) = (&self.app.document, &mut self.app.view.shell);
-                let importing = self.app.jobs.importing.as_ref();
+                let app = &mut self.app;
+                let importing = app.jobs.importing.as_ref();
                 let importing = importing.map(|(_, task)| task.doing());
-                let recent = &self.app.preferences.recent;
-                start::page(ui, document, shell, importing, recent, requests);
+                let parts = &mut Parts {
+                    document: &app.document,
+                    view: &mut app.view,
+                    requests,
+                };
+                start::page(ui, parts, importing, &app.preferences.recent);
                 return;
             }
             self.app.view.needed = Needed::default();
@@ -197,12 +189,20 @@ impl eframe::App for Window {
         self.app.perform_all(&mut requests, &ctx);
         self.panes(ui, &mut requests);
         let (document, view) = (&self.app.document, &mut self.app.view);
-        files::show(&ctx, document, view, &mut requests);
+        let requests = &mut requests;
+        files::show(
+            &ctx,
+            &mut Parts {
+                document,
+                view,
+                requests,
+            },
+        );
         keys::show(&ctx, &mut view.shell.keys);
-        palette::show(&ctx, &mut view.shell.palette, &mut requests);
+        palette::show(&ctx, &mut view.shell.palette, requests);
         self.app.jobs.notices.show(&ctx);
-        alignment::show(&ctx, document, &mut requests);
-        self.app.perform_all(&mut requests, &ctx);
+        alignment::show(&ctx, document, requests);
+        self.app.perform_all(requests, &ctx);
         // A drag is saved once it has ended.
         if !ctx.input(|input| input.pointer.any_down()) {
             self.save();

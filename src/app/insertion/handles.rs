@@ -9,47 +9,19 @@ use crate::scene::geometry::Ray;
 use egui::{Color32, Modifiers, Painter, Pos2, Rect, Stroke, StrokeKind, vec2};
 use glam::{DVec3, Quat, Vec3};
 
-/// What can be dragged, by the object's index.
+/// What the pointer does to an object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Handle {
-    /// The one at its base, which moves it.
-    Move(usize),
-    /// The one beside it, which rotates it.
-    Rotate(usize),
-    /// The one above it, which scales it.
-    Scale(usize),
+pub enum Kind {
+    /// Moves it; its handle is at its base.
+    Move,
+    /// Rotates it; its handle is beside it.
+    Rotate,
+    /// Scales it; its handle is above it.
+    Scale,
 }
 
-/// What a foot is moved along.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Along {
-    /// The surfaces under the pointer.
-    #[default]
-    Surfaces,
-    /// The up axis.
-    Up,
-    /// The plane that it stands on, through whatever is there.
-    Level,
-}
-
-impl Along {
-    /// With Shift up and down, with Ctrl on one level.
-    pub fn of(modifiers: Modifiers) -> Self {
-        match (modifiers.shift, modifiers.command) {
-            (true, _) => Self::Up,
-            (false, true) => Self::Level,
-            _ => Self::Surfaces,
-        }
-    }
-}
-
-impl Handle {
-    fn index(self) -> usize {
-        match self {
-            Self::Move(index) | Self::Rotate(index) | Self::Scale(index) => index,
-        }
-    }
-}
+/// What can be dragged: the object's index, and what the handle does to it.
+pub type Handle = (usize, Kind);
 
 /// Least and greatest scale of an object.
 pub const SCALES: (f64, f64) = (1e-6, 1e6);
@@ -67,30 +39,28 @@ impl Insertions {
         let mut handles = Vec::new();
         let shown = self.objects.iter().enumerate().filter(|(_, o)| !o.hidden);
         for (index, object) in shown {
-            if self.chosen == Some(index) {
-                let handle = self.rotate_handle(object, scene).and_then(&project);
-                let top = self.scale_handle(object, scene).and_then(&project);
-                handles.extend(handle.map(|at| (Handle::Rotate(index), at)));
-                handles.extend(top.map(|at| (Handle::Scale(index), at)));
+            for kind in [Kind::Rotate, Kind::Scale, Kind::Move] {
+                if (kind == Kind::Move || self.chosen == Some(index))
+                    && let Some(at) = self.place(kind, object, scene).and_then(&project)
+                {
+                    handles.push(((index, kind), at));
+                }
             }
-            let foot = foot(object, scene).and_then(&project);
-            handles.extend(foot.map(|at| (Handle::Move(index), at)));
         }
         handles
     }
 
-    /// Where the handle that rotates a placed object is, in scene coordinates: beside its file's +x side, on the ground.
-    fn rotate_handle(&self, object: &Placement, scene: &Scene) -> Option<Vec3> {
+    /// Where a handle of a placed object is, in scene coordinates; that which rotates it is on the ground by its file's +x side.
+    fn place(&self, kind: Kind, object: &Placement, scene: &Scene) -> Option<Vec3> {
         let foot = foot(object, scene)?;
+        if kind == Kind::Move {
+            return Some(foot);
+        }
         let corners = self.models.corners(object, scene)?;
-        let side = (corners[1] + corners[5]) * 0.5;
-        Some(foot + (side - foot) * 1.3)
-    }
-
-    /// Where the handle above a placed object is, in scene coordinates.
-    fn scale_handle(&self, object: &Placement, scene: &Scene) -> Option<Vec3> {
-        let foot = foot(object, scene)?;
-        let corners = self.models.corners(object, scene)?;
+        if kind == Kind::Rotate {
+            let side = (corners[1] + corners[5]) * 0.5;
+            return Some(foot + (side - foot) * 1.3);
+        }
         let height = (corners[2] - corners[0]).length();
         let width = (corners[1] - corners[0]).length();
         Some(foot + scene.up * (height + 0.2 * height.max(width)))
@@ -108,31 +78,39 @@ impl Insertions {
         handles.into_iter().find(near).map(|(handle, _)| handle)
     }
 
-    /// An object's index and placement after `handle` is dragged to the pointer's `ray`, which hits `surface`.
+    /// An object's index and placement after `handle` is dragged to the pointer's `ray`, which hits `surface`. It moves over
+    /// surfaces, up and down with Shift, and on its level through whatever is there with Ctrl.
     pub fn dragged(
         &self,
         handle: Handle,
         scene: &Scene,
         ray: &Ray,
         surface: Option<DVec3>,
-        along: Along,
+        modifiers: Modifiers,
     ) -> Option<(usize, Placement)> {
-        let mut object = self.objects.get(handle.index())?.clone();
-        match handle {
-            Handle::Move(_) => match along {
-                Along::Surfaces => object.at = surface.or(object.at),
-                Along::Up => object.at = raised(&object, scene, ray).or(object.at),
-                Along::Level => object.at = levelled(&object, scene, ray).or(object.at),
-            },
-            Handle::Rotate(_) => object.rotate = self.turned(&object, scene, ray)?,
-            Handle::Scale(_) => object.scale = self.resized(&object, scene, ray)?,
+        let (index, kind) = handle;
+        let mut object = self.objects.get(index)?.clone();
+        match kind {
+            Kind::Move => {
+                let to = match (modifiers.shift, modifiers.command) {
+                    (true, _) => raised(&object, scene, ray),
+                    (false, true) => levelled(&object, scene, ray),
+                    (false, false) => surface,
+                };
+                object.at = to.or(object.at);
+            }
+            Kind::Rotate => object.rotate = self.turned(&object, scene, ray)?,
+            Kind::Scale => object.scale = self.resized(&object, scene, ray)?,
         }
-        Some((handle.index(), object))
+        Some((index, object))
     }
 
     /// The scale that brings the handle above an object to where the ray passes the axis through its foot.
     fn resized(&self, object: &Placement, scene: &Scene, ray: &Ray) -> Option<f64> {
-        let (foot, top) = (foot(object, scene)?, self.scale_handle(object, scene)?);
+        let (foot, top) = (
+            foot(object, scene)?,
+            self.place(Kind::Scale, object, scene)?,
+        );
         let wanted = height_of(foot, scene.up, ray)?;
         let factor = f64::from(wanted / top.distance(foot));
         let scale = (object.scale * factor).clamp(SCALES.0, SCALES.1);
@@ -141,7 +119,10 @@ impl Insertions {
 
     /// The angle that turns an object's handle to where the ray meets the ground plane that it stands on, degrees.
     fn turned(&self, object: &Placement, scene: &Scene, ray: &Ray) -> Option<f64> {
-        let (foot, handle) = (foot(object, scene)?, self.rotate_handle(object, scene)?);
+        let (foot, handle) = (
+            foot(object, scene)?,
+            self.place(Kind::Rotate, object, scene)?,
+        );
         let aim = on_plane(foot, scene.up, ray)? - foot;
         let back = Quat::from_axis_angle(scene.up, -object.rotate.to_radians() as f32);
         let unturned = back * (handle - foot);
@@ -166,22 +147,22 @@ impl Insertions {
             draw_box(painter, &corners, &project, tokens.inserted, 1.5);
         }
         let handles = self.handles(scene, project);
-        for (handle, at) in &handles {
-            match handle {
-                Handle::Move(index) => {
+        for ((index, kind), at) in &handles {
+            match kind {
+                Kind::Move => {
                     let chosen = self.chosen == Some(*index);
                     let radius = if chosen { 5.0 } else { 3.5 };
                     let outline = Stroke::new(1.0, Color32::BLACK);
                     painter.circle(*at, radius, tokens.inserted, outline);
                 }
-                Handle::Rotate(index) => {
-                    let foot = |(other, _): &&(Handle, Pos2)| *other == Handle::Move(*index);
+                Kind::Rotate => {
+                    let foot = |(other, _): &&(Handle, Pos2)| *other == (*index, Kind::Move);
                     if let Some((_, foot)) = handles.iter().find(foot) {
                         painter.line_segment([*foot, *at], Stroke::new(1.5, tokens.inserted));
                     }
                     painter.circle(*at, 4.5, Color32::BLACK, Stroke::new(2.0, tokens.inserted));
                 }
-                Handle::Scale(_) => {
+                Kind::Scale => {
                     let square = Rect::from_center_size(*at, vec2(9.0, 9.0));
                     let (stroke, inside) = (Stroke::new(2.0, tokens.inserted), StrokeKind::Inside);
                     painter.rect(square, 0.0, Color32::BLACK, stroke, inside);
@@ -222,7 +203,6 @@ pub(super) fn height_of(point: Vec3, up: Vec3, ray: &Ray) -> Option<f32> {
     height.is_finite().then_some(height)
 }
 
-/// A number rounded to three digits.
 pub(super) fn three_digits(value: f64) -> f64 {
     let unit = 10f64.powf(value.abs().log10().floor() - 2.0);
     (value / unit).round() * unit
@@ -230,37 +210,26 @@ pub(super) fn three_digits(value: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{Along, Handle};
+    use super::Kind;
     use crate::app::insertion::Insertions;
+    use crate::app::insertion::models::tests::models;
     use crate::app::model::tests::scene;
     use crate::scene::geometry::Ray;
+    use egui::Modifiers;
     use glam::{DVec3, Vec3};
 
-    /// An object whose box is 0.4 wide and 0.2 high about the origin, chosen, in a scene.
-    fn inserted(scene: &crate::scene::Scene) -> Insertions {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let file = folder.path().join("cube.obj");
-        let text = "v -0.2 0 -0.2\nv 0.2 0 0.2\nv 0.2 0.2 0.2\nf 1 2 3\n";
-        std::fs::write(&file, text).expect("written");
+    /// An object whose box is 0.4 wide and 0.2 high about the origin, chosen.
+    fn inserted() -> Insertions {
         let mut insertions = Insertions::default();
-        insertions.add(file, Some(DVec3::ZERO), 1.0);
-        let ctx = egui::Context::default();
-        for _ in 0..500 {
-            let read = insertions.models.update(&ctx, &insertions.objects);
-            if !read.is_empty() {
-                let handle = insertions.scale_handle(&insertions.objects[0], scene);
-                assert!(handle.is_some());
-                return insertions;
-            }
-            std::thread::sleep(std::time::Duration::from_millis(5));
-        }
-        panic!("the object was not read");
+        insertions.add("cube.obj".into(), Some(DVec3::ZERO), 1.0);
+        insertions.models = models([[-0.2, 0.0, -0.2], [0.2, 0.0, 0.2], [0.2, 0.2, 0.2]]);
+        insertions
     }
 
     #[test]
     fn the_handle_beside_turns_the_object_towards_the_pointer_counter_clockwise_from_above() {
         let scene = scene();
-        let mut insertions = inserted(&scene);
+        let mut insertions = inserted();
         let foot = (DVec3::ZERO - scene.origin).as_vec3();
         // Straight down onto the ground, north of the object (−z): a quarter turn from +x.
         for (aim, degrees) in [(Vec3::NEG_Z, 90.0), (Vec3::Z, -90.0), (Vec3::X, 0.0)] {
@@ -275,35 +244,35 @@ mod tests {
     #[test]
     fn the_handle_above_scales_and_the_foot_moves_over_surfaces_up_or_on_one_level() {
         let scene = scene();
-        let mut insertions = inserted(&scene);
+        let mut insertions = inserted();
         let local = |point: DVec3| (point - scene.origin).as_vec3();
         let ray = |from: DVec3, to: DVec3| Ray::new(local(from), (to - from).as_vec3());
 
         // The handle stands at 0.2 + 0.08; at twice that height the object is twice as large.
-        let size = Handle::Scale(0);
+        let size = (0, Kind::Scale);
         let aim = ray(DVec3::new(0.3, 0.5, 3.0), DVec3::new(0.0, 0.56, 0.0));
-        let dragged = insertions.dragged(size, &scene, &aim, None, Along::Surfaces);
+        let dragged = insertions.dragged(size, &scene, &aim, None, Modifiers::NONE);
         insertions.objects[0] = dragged.expect("a size").1;
         let scale = insertions.objects[0].scale;
         assert!((scale - 2.0).abs() < 1e-9, "{scale}");
         // Below the foot there is no size.
         let below = ray(DVec3::new(0.3, 0.5, 3.0), DVec3::new(0.0, -0.4, 0.0));
-        let dragged = insertions.dragged(size, &scene, &below, None, Along::Surfaces);
+        let dragged = insertions.dragged(size, &scene, &below, None, Modifiers::NONE);
         assert!(dragged.is_none());
 
         let level = DVec3::new(0.4, 0.7, 0.1);
         let raised = DVec3::Y * 0.7;
-        for (height, to, along, expected) in [
-            (1.0, raised, Along::Up, raised),
-            (2.0, level, Along::Level, level),
-            (2.0, level, Along::Surfaces, DVec3::X),
+        for (height, to, modifiers, expected) in [
+            (1.0, raised, Modifiers::SHIFT, raised),
+            (2.0, level, Modifiers::COMMAND, level),
+            (2.0, level, Modifiers::NONE, DVec3::X),
         ] {
             let aim = ray(DVec3::new(0.0, height, 3.0), to);
-            let foot = Handle::Move(0);
-            let dragged = insertions.dragged(foot, &scene, &aim, Some(DVec3::X), along);
+            let foot = (0, Kind::Move);
+            let dragged = insertions.dragged(foot, &scene, &aim, Some(DVec3::X), modifiers);
             insertions.objects[0] = dragged.expect("a place").1;
             let at = insertions.objects[0].at.expect("a place");
-            assert!(at.distance(expected) < 1e-5, "{along:?}: {at}");
+            assert!(at.distance(expected) < 1e-5, "{modifiers:?}: {at}");
         }
     }
 }

@@ -10,10 +10,6 @@ use glam::{DVec3, Vec3};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// An object's file, and its shape or why it cannot be read.
-pub type Read = (PathBuf, std::result::Result<(), String>);
-
-/// What is known of an object's file.
 enum Shape {
     Reading(Task<(), Outline>),
     Read(Outline),
@@ -24,8 +20,12 @@ enum Shape {
 pub struct Models(HashMap<PathBuf, Shape>);
 
 impl Models {
-    /// Starts reading what is not known yet; gives the files that have been read since the last call.
-    pub fn update(&mut self, ctx: &egui::Context, objects: &[Placement]) -> Vec<Read> {
+    /// Starts reading what is not known yet; gives the files that have been read since the last call, or why they cannot be.
+    pub fn update(
+        &mut self,
+        ctx: &egui::Context,
+        objects: &[Placement],
+    ) -> Vec<(PathBuf, Result<(), String>)> {
         for object in objects {
             self.ask(ctx, &object.file);
         }
@@ -51,11 +51,10 @@ impl Models {
         if let Some(known) = self.0.get(file) {
             return matches!(known, Shape::Read(_));
         }
-        let (ctx, path) = (ctx.clone(), file.to_owned());
-        let wake = move || ctx.request_repaint();
+        let path = file.to_owned();
         let read = move |_: &Progress<()>| Ok(Outline::new(&ObjectModel::read(&path)?));
         // Without a thread the object has no box.
-        if let Ok(task) = Task::begin("object", wake, read) {
+        if let Ok(task) = Task::begin("object", ctx, read) {
             self.0.insert(file.to_owned(), Shape::Reading(task));
         }
         false
@@ -81,8 +80,7 @@ impl Models {
 
     /// A power of ten that makes an object at most a third of the scene, where it is larger than that as modelled.
     pub fn fitting_scale(&self, file: &Path, scene: &Scene) -> Option<f64> {
-        let (low, high) = self.shape(file)?.bounds;
-        let size = (high - low).max_element();
+        let size = self.size(file)?.max_element();
         let diameter = f64::from(scene.diameter);
         if size <= diameter || !size.is_finite() {
             return None;
@@ -111,11 +109,9 @@ struct Outline {
     bounds: (DVec3, DVec3),
     /// The outermost points along [`DIRECTIONS`] directions: bounds of a large model that is tilted take long to compute.
     points: Vec<DVec3>,
-    /// The material with the largest area.
     material: MaterialOverride,
 }
 
-/// The golden angle in radians.
 const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
 /// Number of directions that outermost points are found for; they are about 14° apart.
 const DIRECTIONS: u32 = 200;
@@ -162,21 +158,23 @@ pub fn draw_box(
     }
 }
 
+/// What tests of inserted objects share.
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
     use crate::app::model::tests::scene;
 
-    fn models(size: f64) -> Models {
-        let corners = vec![[
-            DVec3::ZERO,
-            DVec3::new(size, 0.0, size),
-            DVec3::new(0.0, size, 0.0),
-        ]];
+    /// A model of one triangle in `cube.obj`.
+    pub fn models(corners: [[f64; 3]; 3]) -> Models {
         let material = MaterialOverride::default().surface().material(None);
+        let corners = vec![corners.map(DVec3::from)];
         let model = ObjectModel::from_corners("cube", corners, material).expect("a model");
         let shape = Shape::Read(Outline::new(&model));
         Models([("cube.obj".into(), shape)].into())
+    }
+
+    fn cube(size: f64) -> Models {
+        models([[0.0; 3], [size, 0.0, size], [0.0, size, 0.0]])
     }
 
     #[test]
@@ -186,7 +184,7 @@ mod tests {
             scale: 2.0,
             ..Placement::new("cube.obj", Some(DVec3::new(0.5, 0.0, -0.2)))
         };
-        let corners = models(0.1).corners(&placement, &scene).expect("known");
+        let corners = cube(0.1).corners(&placement, &scene).expect("known");
         let points = corners.map(|p| p.as_dvec3() + scene.origin);
         let low = points.into_iter().fold(DVec3::INFINITY, DVec3::min);
         let high = points.into_iter().fold(DVec3::NEG_INFINITY, DVec3::max);
@@ -198,8 +196,8 @@ mod tests {
     fn only_what_is_larger_than_the_scene_is_scaled() {
         let scene = scene();
         let file = Path::new("cube.obj");
-        assert_eq!(models(1.0).fitting_scale(file, &scene), None);
-        let scale = models(90.0).fitting_scale(file, &scene).expect("too large");
+        assert_eq!(cube(1.0).fitting_scale(file, &scene), None);
+        let scale = cube(90.0).fitting_scale(file, &scene).expect("too large");
         assert!((scale - 0.01).abs() < 1e-9, "{scale}");
     }
 }

@@ -2,32 +2,20 @@
 //! axis, a click or Enter keeps the result, Escape takes it back.
 
 use crate::app::insertion::Insertions;
-use crate::app::insertion::handles::{SCALES, foot, height_of, three_digits};
+use crate::app::insertion::handles::{Kind, SCALES, foot, height_of, three_digits};
 use crate::compose::placement::Placement;
 use crate::scene::Scene;
 use crate::scene::geometry::Ray;
 use egui::{Context, Key, Modifiers, Pos2};
 use glam::{DQuat, DVec2, DVec3, EulerRot, Vec3};
 
-/// What the pointer does to the object.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    /// Moves it over surfaces, or along the axis.
-    Grab,
-    /// Rotates it about the up axis, or about the axis, by the angle that the pointer goes around its foot.
-    Rotate,
-    /// Scales it.
-    Scale,
-}
-
-/// An axis of the capture's coordinates: x, y or z.
-type Axis = usize;
-
-/// A transform under way.
+/// A transform under way. It moves over surfaces or along the axis, and rotates about the up axis or about the axis, by the angle
+/// that the pointer goes around the object's foot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transform {
     kind: Kind,
-    axis: Option<Axis>,
+    /// The axis of the capture's coordinates: x, y or z.
+    axis: Option<usize>,
     /// The object's index and placement at the start.
     index: usize,
     before: Placement,
@@ -45,7 +33,7 @@ impl Transform {
     ) -> Option<(usize, Placement)> {
         let pressed = |key| ctx.input_mut(|input| input.consume_key(Modifiers::NONE, key));
         for (key, kind) in [
-            (Key::G, Kind::Grab),
+            (Key::G, Kind::Move),
             (Key::R, Kind::Rotate),
             (Key::S, Kind::Scale),
         ] {
@@ -89,8 +77,8 @@ impl Transform {
         let mut object = self.before.clone();
         let foot = foot(&object, scene)?;
         match (self.kind, self.axis) {
-            (Kind::Grab, None) => object.at = surface.or(object.at),
-            (Kind::Grab, Some(axis)) => {
+            (Kind::Move, None) => object.at = surface.or(object.at),
+            (Kind::Move, Some(axis)) => {
                 let along = Vec3::AXES[axis];
                 let far = height_of(foot, along, ray)?;
                 object.at = object.at.map(|at| at + (along * far).as_dvec3());
@@ -118,15 +106,10 @@ impl Transform {
 
     /// What is under way, in words.
     pub fn words(&self) -> String {
-        let kind = match self.kind {
-            Kind::Grab => "Move",
-            Kind::Rotate => "Rotate",
-            Kind::Scale => "Scale",
-        };
-        let way = if self.kind == Kind::Rotate {
-            "about"
-        } else {
-            "along"
+        let (kind, way) = match self.kind {
+            Kind::Move => ("Move", "along"),
+            Kind::Rotate => ("Rotate", "about"),
+            Kind::Scale => ("Scale", "along"),
         };
         let held = |axis| format!(" {way} {}", ["X", "Y", "Z"][axis]);
         let axis = self.axis.map_or_else(String::new, held);
@@ -151,7 +134,7 @@ mod tests {
     use super::*;
     use crate::app::model::tests::scene;
 
-    fn begun(kind: Kind, axis: Option<Axis>) -> Transform {
+    fn begun(kind: Kind, axis: Option<usize>) -> Transform {
         Transform {
             kind,
             axis,
@@ -176,7 +159,7 @@ mod tests {
     #[test]
     fn an_object_follows_the_pointer_over_surfaces_or_along_an_axis() {
         for (axis, z) in [(None, 0.7), (Some(0), 0.5)] {
-            let moved = placed(&mut begun(Kind::Grab, axis), Pos2::new(30.0, 20.0));
+            let moved = placed(&mut begun(Kind::Move, axis), Pos2::new(30.0, 20.0));
             let at = moved.at.expect("a place");
             assert!(at.distance(DVec3::new(0.8, 0.0, z)) < 1e-5, "{at}");
         }

@@ -1,6 +1,6 @@
 //! What the 3D view's faces are coloured by.
 
-use crate::app::choices::choices;
+use crate::app::controls::choices;
 use crate::app::model::surface::Surface;
 use crate::inverse::estimate::Estimate;
 use crate::scene::Scene;

@@ -2,7 +2,9 @@
 
 use crate::app::model::surface::Surface;
 use crate::app::model::view::Colors;
-use crate::app::picture::gpu::{bind, fill, float_texture, pipeline, texture};
+use crate::app::picture::gpu::{
+    bind, fill, float_texture, pipeline, texture, uniform_buffer, view,
+};
 use eframe::egui_wgpu::{CallbackResources, CallbackTrait, RenderState, ScreenDescriptor};
 use egui::PaintCallbackInfo;
 use std::sync::Arc;
@@ -44,7 +46,6 @@ pub struct MeshPaint {
     pub size: [u32; 2],
 }
 
-/// Everything on the card.
 struct Meshes {
     mesh_pipeline: wgpu::RenderPipeline,
     screen_pipeline: wgpu::RenderPipeline,
@@ -91,12 +92,7 @@ pub fn install(render_state: &RenderState) {
         render_state.target_format,
     );
     let screen_pipeline = pipeline(device, &shader, names, &[], None, format);
-    let uniform = device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("3D view"),
-        size: size_of::<SceneUniform>() as u64,
-        usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
+    let uniform = uniform_buffer::<SceneUniform>(device);
     let mut renderer = render_state.renderer.write();
     renderer.callback_resources.insert(Meshes {
         mesh_pipeline,
@@ -130,10 +126,9 @@ impl CallbackTrait for MeshPaint {
         pass: &mut wgpu::RenderPass<'static>,
         resources: &CallbackResources,
     ) {
-        let target = resources
-            .get::<Meshes>()
-            .and_then(|meshes| Some((meshes, meshes.target.as_ref()?)));
-        if let Some((meshes, target)) = target {
+        if let Some(meshes) = resources.get::<Meshes>()
+            && let Some(target) = &meshes.target
+        {
             pass.set_pipeline(&meshes.screen_pipeline);
             pass.set_bind_group(0, &target.bind_group, &[]);
             pass.draw(0..3, 0..1);
@@ -177,7 +172,12 @@ impl Meshes {
         texels.resize((rows * COLUMNS) as usize, [0.0; 4]);
         let texture = float_texture(device, "face colours", [COLUMNS, rows]);
         fill(queue, &texture, &texels);
-        bind(device, &self.mesh_pipeline, &self.uniform, &texture)
+        bind(
+            device,
+            &self.mesh_pipeline,
+            Some(&self.uniform),
+            &view(&texture),
+        )
     }
 
     /// Draws the faces, unless the picture already shows them so.
@@ -230,25 +230,14 @@ impl Meshes {
     }
 
     fn new_target(&self, device: &wgpu::Device, size: [u32; 2]) -> Target {
-        let view = |format, usage| {
-            let texture = texture(device, "3D view", size, format, usage);
-            texture.create_view(&wgpu::TextureViewDescriptor::default())
-        };
+        let picture = |format, usage| view(&texture(device, "3D view", size, format, usage));
         let attachment = wgpu::TextureUsages::RENDER_ATTACHMENT;
-        let color = view(COLOR, attachment | wgpu::TextureUsages::TEXTURE_BINDING);
-        let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("3D view"),
-            layout: &self.screen_pipeline.get_bind_group_layout(0),
-            entries: &[wgpu::BindGroupEntry {
-                binding: 0,
-                resource: wgpu::BindingResource::TextureView(&color),
-            }],
-        });
+        let color = picture(COLOR, attachment | wgpu::TextureUsages::TEXTURE_BINDING);
         Target {
             size,
-            depth: view(DEPTH, attachment),
+            bind_group: bind(device, &self.screen_pipeline, None, &color),
+            depth: picture(DEPTH, attachment),
             color,
-            bind_group,
             shows: None,
         }
     }

@@ -69,16 +69,11 @@ mod tests {
         let mut lasso = Lasso::default();
         assert!(!lasso.encloses(pos2(0.0, 0.0)));
         // A horseshoe that is open to the right.
-        for (x, y) in [
-            (0, 0),
-            (40, 0),
-            (40, 10),
-            (10, 10),
-            (10, 30),
-            (40, 30),
-            (40, 40),
-            (0, 40),
-        ] {
+        let [xs, ys] = [
+            [0, 40, 40, 10, 10, 40, 40, 0],
+            [0, 0, 10, 10, 30, 30, 40, 40],
+        ];
+        for (x, y) in xs.into_iter().zip(ys) {
             lasso.draw(pos2(x as f32, y as f32));
         }
         for (x, y, inside) in [

@@ -178,13 +178,14 @@ impl Orbit {
 mod tests {
     use super::*;
     use crate::app::model::tests::scene;
+    use std::sync::Arc;
 
     fn on_screen(orbit: &Orbit, scene: &Scene, point: Vec3) -> Vec2 {
         let clip = orbit.clip_from_scene(scene) * point.extend(1.0);
         Vec2::new(0.5 + 0.5 * clip.x / clip.w, 0.5 - 0.5 * clip.y / clip.w) * orbit.size
     }
 
-    fn framed() -> (Scene, Orbit) {
+    fn framed() -> (Arc<Scene>, Orbit) {
         let scene = scene();
         let mut orbit = Orbit {
             size: Vec2::new(400.0, 300.0),

@@ -1,27 +1,27 @@
 //! The pane of the 3D view: tool line, mouse and keys, and drawing.
 
 use crate::app::controls::{choose, named};
-use crate::app::document::Document;
-use crate::app::insertion::handles::Along;
 use crate::app::model::gpu::{MeshPaint, SceneUniform};
 use crate::app::model::lasso::Lasso;
-use crate::app::model::overlay::{self, Projection};
+use crate::app::model::overlay::{self, projection};
 use crate::app::model::view::ModelView;
 use crate::app::picture::gpu::rgba;
-use crate::app::request::{Request, Requests};
+use crate::app::picture::look::fraction;
+use crate::app::request::Request;
+use crate::app::shown::ray;
 use crate::app::theme;
 use crate::app::tool::{Clicked, Pick};
-use crate::app::view::ViewState;
+use crate::app::view::Parts;
 use crate::scene::Scene;
 use crate::scene::geometry::{Hit, Ray};
 use egui::{Key, PointerButton, Rect, Response, Role, Sense, Ui};
-use glam::{DVec3, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 
 /// Draws the pane.
-pub fn pane(ui: &mut Ui, document: &Document, view: &mut ViewState, requests: &mut Requests) {
-    theme::strip(ui, |ui| controls(ui, &mut view.model));
+pub fn pane(ui: &mut Ui, parts: &mut Parts<'_>) {
+    theme::strip(ui, |ui| controls(ui, &mut parts.view.model));
     let rect = ui.available_rect_before_wrap();
-    let tokens = theme::tokens(ui);
+    let (document, tokens) = (parts.document, theme::tokens(ui));
     let Some(capture) = document.capture() else {
         ui.painter().rect_filled(rect, 0.0, tokens.surround);
         ui.centered_and_justified(|ui| ui.weak(document.nothing_open()));
@@ -29,7 +29,7 @@ pub fn pane(ui: &mut Ui, document: &Document, view: &mut ViewState, requests: &m
     };
     let scene = &capture.scene;
     let pixels = rect.size() * ui.pixels_per_point();
-    let orbit = &mut view.model.orbit;
+    let orbit = &mut parts.view.model.orbit;
     orbit.size = Vec2::new(pixels.x.max(1.0), pixels.y.max(1.0));
     if orbit.distance == 0.0 {
         orbit.frame(scene, None);
@@ -37,17 +37,23 @@ pub fn pane(ui: &mut Ui, document: &Document, view: &mut ViewState, requests: &m
 
     let response = ui.allocate_rect(rect, Sense::click_and_drag());
     let response = named(response, Role::Image, "3D view picture");
-    let before = view.model.orbit.clone();
-    let cuts = cut_out(ui, view, requests, scene, &response);
-    if !transform_object(ui, view, requests, scene, &response) {
-        if !move_object(ui, document, view, requests, scene, &response) {
+    let before = parts.view.model.orbit.clone();
+    let cuts = cut_out(ui, parts, scene, &response);
+    let transform = &mut parts.view.tool.transform;
+    // A click keeps what the keys began.
+    if transform.take_if(|_| response.clicked()).is_none() {
+        let transforms = transform.is_some() && response.hovered();
+        if !move_object(parts, scene, &response) {
             if !cuts {
-                drag(ui, &mut view.model, &response);
+                drag(ui, &mut parts.view.model, &response);
             }
-            zoom_and_fly(ui, &mut view.model, scene, &response);
+            zoom_and_fly(ui, &mut parts.view.model, scene, &response);
         }
-        click(ui, view, requests, scene, &response);
+        if !transforms {
+            click(ui, parts, scene, &response);
+        }
     }
+    let view = &mut *parts.view;
     if let Some(camera) = &mut view.shown.free
         && before != view.model.orbit
     {
@@ -93,15 +99,13 @@ fn controls(ui: &mut Ui, model: &mut ModelView) {
     });
 }
 
-/// Where the pointer is in the view, in its pixels.
-fn pixel(ui: &Ui, rect: Rect, pointer: egui::Pos2) -> Vec2 {
-    let offset = (pointer - rect.min) * ui.pixels_per_point();
-    Vec2::new(offset.x, offset.y)
+/// The ray through a point of the screen.
+fn aimed(model: &ModelView, rect: Rect, pointer: egui::Pos2) -> Ray {
+    ray(&model.orbit.camera(), fraction(rect, pointer))
 }
 
-/// The surface under a pixel, leaving out what is not drawn.
-fn under(model: &ModelView, scene: &Scene, pixel: Vec2) -> Option<Hit> {
-    let mut ray = model.orbit.camera().ray(pixel);
+/// The surface that a ray meets, leaving out what is not drawn.
+fn under(model: &ModelView, scene: &Scene, mut ray: Ray) -> Option<Hit> {
     loop {
         let hit = scene.intersect(&ray)?;
         let normal = scene.normals.get(hit.triangle as usize)?;
@@ -113,13 +117,6 @@ fn under(model: &ModelView, scene: &Scene, pixel: Vec2) -> Option<Hit> {
             ..ray
         };
     }
-}
-
-/// The ray through a pixel, and where it meets a surface in the capture's coordinates.
-fn aimed_at(model: &ModelView, scene: &Scene, pixel: Vec2) -> (Ray, Option<DVec3>) {
-    let hit = under(model, scene, pixel);
-    let surface = hit.map(|hit| scene.point(&hit).as_dvec3() + scene.origin);
-    (model.orbit.camera().ray(pixel), surface)
 }
 
 /// Orbits or pans.
@@ -139,16 +136,13 @@ fn zoom_and_fly(ui: &Ui, model: &mut ModelView, scene: &Scene, response: &Respon
     let Some(pointer) = response.hover_pos() else {
         return;
     };
-    let at = pixel(ui, response.rect, pointer);
+    let ray = aimed(model, response.rect, pointer);
     let (scroll, pinch) = ui.input(|input| (input.smooth_scroll_delta.y, input.zoom_delta()));
     let factor = (scroll * 0.004).exp() * pinch;
     if factor != 1.0 {
-        let point = match under(model, scene, at) {
+        let point = match under(model, scene, ray) {
             Some(hit) => scene.point(&hit),
-            None => {
-                let ray = model.orbit.camera().ray(at);
-                ray.origin + ray.direction * model.orbit.distance
-            }
+            None => ray.origin + ray.direction * model.orbit.distance,
         };
         model.orbit.zoom_to(point, 1.0 / factor, scene);
     }
@@ -171,13 +165,8 @@ fn zoom_and_fly(ui: &Ui, model: &mut ModelView, scene: &Scene, response: &Respon
 
 /// Draws the lasso, and at its end makes what it encloses an object of its own: of the selected objects alone, where any
 /// are. False where no lasso is drawn.
-fn cut_out(
-    ui: &Ui,
-    view: &mut ViewState,
-    requests: &mut Requests,
-    scene: &Scene,
-    response: &Response,
-) -> bool {
+fn cut_out(ui: &Ui, parts: &mut Parts<'_>, scene: &Scene, response: &Response) -> bool {
+    let view = &mut *parts.view;
     if view.tool.pick != Some(Pick::Lasso) {
         return false;
     }
@@ -187,11 +176,11 @@ fn cut_out(
         let object_of = |face: u32| scene.object_of[face as usize];
         let faces = (0..scene.triangles.len() as u32)
             .filter(|&face| selected.is_empty() || selected.contains(&object_of(face)));
-        let projection = Projection::new(&view.model.orbit, scene, response.rect);
-        let seen = |at| under(&view.model, scene, pixel(ui, response.rect, at));
-        let enclosed = lasso.enclosed(scene, faces, |point| projection.at(point), seen);
+        let project = projection(&view.model.orbit, scene, response.rect);
+        let seen = |at| under(&view.model, scene, aimed(&view.model, response.rect, at));
+        let enclosed = lasso.enclosed(scene, faces, project, seen);
         view.tool.pick = None;
-        requests.ask(Request::CutOut(enclosed));
+        parts.requests.ask(Request::CutOut(enclosed));
     }
     if !response.dragged_by(PointerButton::Primary) {
         return false;
@@ -207,70 +196,27 @@ fn cut_out(
     true
 }
 
-/// Moves, rotates or scales an inserted object by the pointer, as the keys asked; false where they did not.
-fn transform_object(
-    ui: &Ui,
-    view: &mut ViewState,
-    requests: &mut Requests,
-    scene: &Scene,
-    response: &Response,
-) -> bool {
-    let clicked = response.clicked();
-    if view.tool.transform.take_if(|_| clicked).is_some() {
-        return true;
-    }
-    let Some((pointer, transform)) = response.hover_pos().zip(view.tool.transform.as_mut()) else {
-        return false;
+/// Moves an inserted object by the pointer; false where it has hold of none.
+fn move_object(parts: &mut Parts<'_>, scene: &Scene, response: &Response) -> bool {
+    let (tool, model) = (&mut parts.view.tool, &parts.view.model);
+    let lasso = tool.pick == Some(Pick::Lasso);
+    let started = response.drag_started_by(PointerButton::Primary) && !lasso;
+    let project = projection(&model.orbit, scene, response.rect);
+    let aim = |pointer| {
+        let ray = aimed(model, response.rect, pointer);
+        let hit = under(model, scene, ray);
+        let surface = hit.map(|hit| scene.point(&hit).as_dvec3() + scene.origin);
+        (ray, surface)
     };
-    let (ray, surface) = aimed_at(&view.model, scene, pixel(ui, response.rect, pointer));
-    let projection = Projection::new(&view.model.orbit, scene, response.rect);
-    let project = |point| projection.at(point);
-    let placed = transform.placed(scene, pointer, &ray, surface, project);
-    requests.ask_all(placed.map(|(index, to)| Request::Place(index, to)));
-    true
-}
-
-/// Drags a handle of an inserted object; false while none is held.
-fn move_object(
-    ui: &Ui,
-    document: &Document,
-    view: &mut ViewState,
-    requests: &mut Requests,
-    scene: &Scene,
-    response: &Response,
-) -> bool {
-    if view.tool.pick == Some(Pick::Lasso) {
-        return false;
-    }
-    if response.drag_started_by(PointerButton::Primary)
-        && let Some(press) = ui.input(|input| input.pointer.press_origin())
-    {
-        let projection = Projection::new(&view.model.orbit, scene, response.rect);
-        let handle = (document.insertions).handle_at(scene, press, |point| projection.at(point));
-        view.tool.dragged = handle;
-    }
-    if response.drag_stopped() {
-        view.tool.dragged = None;
-    }
-    let pointer = (response.interact_pointer_pos()).filter(|_| response.dragged());
-    let Some((pointer, handle)) = pointer.zip(view.tool.dragged) else {
-        return false;
-    };
-    let (ray, surface) = aimed_at(&view.model, scene, pixel(ui, response.rect, pointer));
-    let along = Along::of(ui.input(|input| input.modifiers));
-    let dragged = (document.insertions).dragged(handle, scene, &ray, surface, along);
-    requests.ask_all(dragged.map(|(index, to)| Request::Place(index, to)));
-    true
+    let insertions = &parts.document.insertions;
+    let (holds, placed) = tool.follow(response, started, insertions, scene, project, aim);
+    (parts.requests).ask_all(placed.map(|(index, to)| Request::Place(index, to)));
+    holds
 }
 
 /// A click looks through a camera, places the chosen object, or selects; a double click turns about what is there.
-fn click(
-    ui: &Ui,
-    view: &mut ViewState,
-    requests: &mut Requests,
-    scene: &Scene,
-    response: &Response,
-) {
+fn click(ui: &Ui, parts: &mut Parts<'_>, scene: &Scene, response: &Response) {
+    let (view, requests) = (&mut *parts.view, &mut *parts.requests);
     let pointer = response.interact_pointer_pos();
     let Some(pointer) = pointer.filter(|_| response.clicked()) else {
         return;
@@ -281,15 +227,14 @@ fn click(
         requests.ask(Request::LookThrough(frame));
         return;
     }
-    let at = pixel(ui, response.rect, pointer);
-    let hit = under(&view.model, scene, at);
+    let ray = aimed(&view.model, response.rect, pointer);
+    let hit = under(&view.model, scene, ray);
     if let Some(hit) = &hit
         && response.double_clicked()
     {
         let orbit = &mut view.model.orbit;
         orbit.target = orbit.eye() + orbit.forward() * scene.point(hit).distance(orbit.eye());
     }
-    let ray = view.model.orbit.camera().ray(at);
     let more = ui.input(|input| input.modifiers.command);
     let clicked = hit.and_then(|hit| Clicked::new(scene, &ray, &hit));
     requests.ask(Request::Click(clicked, more));

@@ -64,7 +64,17 @@ impl ModelView {
         estimate: &Arc<Estimate>,
     ) -> Option<(Arc<Surface>, Colors)> {
         if self.making.is_none() {
-            self.making = make(ctx, capture);
+            let capture = capture.clone();
+            let made = Task::begin("3D view", ctx, move |progress| {
+                let surface = Arc::new(Surface::new(&capture.scene));
+                progress.show((surface.clone(), Vec::new()));
+                if !progress.is_cancelled() {
+                    progress.show((surface.clone(), surface.photographed(&capture)));
+                }
+                Ok(())
+            });
+            let made = made.map_err(|error| say::note(format_args!("{error}")));
+            self.making = made.ok();
         }
         if let Some(made) = self.making.as_ref().and_then(Task::newest) {
             (self.made, self.colors) = (Some(made), None);
@@ -82,20 +92,4 @@ impl ModelView {
         self.colors = Some((self.coloring, estimate.clone(), colors.clone()));
         Some((surface.clone(), colors))
     }
-}
-
-/// Cuts up the mesh and colours it by the photographs, on a thread; wakes the window as parts are ready.
-fn make(ctx: &egui::Context, capture: &Arc<OpenCapture>) -> Option<Task<Made, ()>> {
-    let (ctx, capture) = (ctx.clone(), capture.clone());
-    let wake = move || ctx.request_repaint();
-    let made = Task::begin("3D view", wake, move |progress| {
-        let surface = Arc::new(Surface::new(&capture.scene));
-        progress.show((surface.clone(), Vec::new()));
-        if !progress.is_cancelled() {
-            progress.show((surface.clone(), surface.photographed(&capture)));
-        }
-        Ok(())
-    });
-    made.map_err(|error| say::note(format_args!("{error}")))
-        .ok()
 }

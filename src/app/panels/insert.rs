@@ -2,62 +2,53 @@
 
 use crate::app::action::Action;
 use crate::app::controls::{color_button, named, path_field, point, switched};
-use crate::app::document::Document;
 use crate::app::insertion::handles::SCALES;
 use crate::app::insertion::{Adding, Insertions, name};
 use crate::app::request::{Request, Requests};
 use crate::app::shell::dialogs::Ask;
 use crate::app::theme;
-use crate::app::tool::Tool;
+use crate::app::view::Parts;
 use crate::compose::object::surface::MaterialOverride;
 use crate::compose::placement::Placement;
-use egui::{Button, Checkbox, DragValue, Grid, Role, ScrollArea, Ui};
+use crate::scene::Scene;
+use egui::{Button, Checkbox, DragValue, Grid, Role, Ui};
 use glam::DVec3;
 use std::path::PathBuf;
 
 /// Draws the pane.
-pub fn pane(
-    ui: &mut Ui,
-    document: &Document,
-    tool: &Tool,
-    adding: &mut Adding,
-    requests: &mut Requests,
-) {
-    let Some(capture) = document.capture() else {
-        ui.weak(document.nothing_open());
+pub fn pane(ui: &mut Ui, parts: &mut Parts<'_>, scene: &Scene) {
+    let (insertions, requests) = (&parts.document.insertions, &mut *parts.requests);
+    let adding = &mut parts.view.panels.adding;
+    add(ui, adding, requests);
+    if let Some(problem) = &adding.problem {
+        ui.colored_label(theme::tokens(ui).error, problem);
+    }
+    if insertions.objects.is_empty() {
+        ui.add_space(theme::GAP);
+        ui.weak("OBJ and GLB files can also be dropped on the window. Then click where the object should stand.");
         return;
-    };
-    let insertions = &document.insertions;
-    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        add(ui, adding, requests);
-        if let Some(problem) = &adding.problem {
-            ui.colored_label(theme::tokens(ui).error, problem);
+    }
+    ui.separator();
+    list(ui, insertions, requests);
+    ui.separator();
+    actions(ui, parts.view.tool.placing, requests);
+    if let Some((index, object)) = insertions.chosen() {
+        let mut edited = object.clone();
+        edit(ui, &mut edited, f64::from(scene.diameter));
+        let found = insertions.models.material(&edited.file);
+        material(ui, found.unwrap_or_default(), &mut edited.material);
+        if let Some(size) = insertions.models.size(&edited.file) {
+            let [width, height, depth] = (size * edited.scale).to_array();
+            ui.weak(format!(
+                "{width:.2} m wide, {height:.2} m high, {depth:.2} m deep"
+            ));
         }
-        if insertions.objects.is_empty() {
-            ui.add_space(theme::GAP);
-            ui.weak("OBJ and GLB files can also be dropped on the window. Then click where the object should stand.");
-            return;
+        if edited != *object {
+            requests.ask(Request::Place(index, edited));
         }
-        ui.separator();
-        list(ui, insertions, requests);
-        ui.separator();
-        actions(ui, tool.placing, requests);
-        if let Some((index, object)) = insertions.chosen() {
-            let mut edited = object.clone();
-            edit(ui, &mut edited, f64::from(capture.scene.diameter));
-            let found = insertions.models.material(&edited.file);
-            material(ui, found.unwrap_or_default(), &mut edited.material);
-            if let Some(size) = insertions.models.size(&edited.file) {
-                let [width, height, depth] = (size * edited.scale).to_array();
-                ui.weak(format!("{width:.2} m wide, {height:.2} m high, {depth:.2} m deep"));
-            }
-            if edited != *object {
-                requests.ask(Request::Place(index, edited));
-            }
-        }
-        ui.separator();
-        results(ui, insertions.finish, requests);
-    });
+    }
+    ui.separator();
+    results(ui, insertions.finish, requests);
 }
 
 fn add(ui: &mut Ui, adding: &mut Adding, requests: &mut Requests) {
@@ -81,7 +72,6 @@ fn add(ui: &mut Ui, adding: &mut Adding, requests: &mut Requests) {
     });
 }
 
-/// All inserted objects.
 fn list(ui: &mut Ui, insertions: &Insertions, requests: &mut Requests) {
     for (index, object) in insertions.objects.iter().enumerate() {
         ui.horizontal(|ui| {
@@ -106,7 +96,6 @@ fn list(ui: &mut Ui, insertions: &Insertions, requests: &mut Requests) {
     }
 }
 
-/// Buttons for the chosen object.
 fn actions(ui: &mut Ui, placing: bool, requests: &mut Requests) {
     ui.horizontal_wrapped(|ui| {
         let text = match placing {
@@ -166,7 +155,6 @@ fn edit(ui: &mut Ui, object: &mut Placement, diameter: f64) {
     });
 }
 
-/// An angle in degrees.
 fn degrees(ui: &mut Ui, name: &str, prefix: &str, angle: &mut f64) {
     let drag = DragValue::new(angle).range(-360.0..=360.0).speed(1.0);
     let drag = drag.max_decimals(4).prefix(prefix).suffix(" °");
@@ -229,9 +217,8 @@ fn results(ui: &mut Ui, finish: bool, requests: &mut Requests) {
     });
     let mut wanted = finish;
     let help = "Makes objects as soft and as grainy as the 8-bit photograph that they are put into";
-    ui.checkbox(&mut wanted, "Blur and grain of the photograph")
-        .on_hover_text(help);
-    if wanted != finish {
+    let finish = ui.checkbox(&mut wanted, "Blur and grain of the photograph");
+    if finish.on_hover_text(help).changed() {
         requests.ask(Request::Finish(wanted));
     }
 }

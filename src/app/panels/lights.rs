@@ -5,67 +5,53 @@ use crate::app::controls::{color_button, named, switched};
 use crate::app::document::Document;
 use crate::app::lights::place;
 use crate::app::request::{Request, Requests};
+use crate::app::view::Parts;
 use crate::export::light_layers;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::session::snapshot::LightSource;
-use egui::{
-    Button, Checkbox, DragValue, Grid, Role, ScrollArea, Slider, SliderClamping, Ui, WidgetInfo,
-};
+use egui::{Button, Checkbox, DragValue, Grid, Role, Slider, SliderClamping, Ui, WidgetInfo};
 
 /// The strength at the end of a slider; a larger one can be typed.
 const MAX: f32 = 4.0;
 
-/// Draws the pane; `camera` is that of the shown view.
-pub fn pane(
-    ui: &mut Ui,
-    document: &Document,
-    selected: Option<u32>,
-    camera: Option<&Camera>,
-    requests: &mut Requests,
-) {
-    if !document.objects_are_current() {
-        ui.weak("Reading the mesh again…");
+/// Draws the pane.
+pub fn pane(ui: &mut Ui, parts: &mut Parts<'_>, scene: &Scene) {
+    let (document, requests) = (parts.document, &mut *parts.requests);
+    let camera = parts.view.shown.camera(document);
+    let selected = parts.view.selection.object;
+    let lamps = document.lamps();
+    if lamps.is_empty() {
+        ui.weak("Nothing emits light in this estimate yet.");
         return;
     }
-    let Some(capture) = document.capture() else {
-        ui.weak(document.nothing_open());
-        return;
-    };
-    let lamps = document.lamps();
-    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        if lamps.is_empty() {
-            ui.weak("Nothing emits light in this estimate yet.");
-            return;
+    ui.horizontal_wrapped(|ui| {
+        for (action, text) in [
+            (Action::BeforeAfter, "Before and after"),
+            (Action::ResetLights, "Reset lights"),
+            (Action::SaveLayers, "Save layers…"),
+            (Action::Undo, "Undo"),
+            (Action::Redo, "Redo"),
+        ] {
+            requests.button(ui, action, Button::new(text));
         }
-        ui.horizontal_wrapped(|ui| {
-            for (action, text) in [
-                (Action::BeforeAfter, "Before and after"),
-                (Action::ResetLights, "Reset lights"),
-                (Action::SaveLayers, "Save layers…"),
-                (Action::Undo, "Undo"),
-                (Action::Redo, "Redo"),
-            ] {
-                requests.button(ui, action, Button::new(text));
-            }
-        });
-        ui.separator();
-        let grid = Grid::new("lights").num_columns(5).striped(true);
-        grid.show(ui, |ui| {
-            for (source, objects) in &lamps {
-                let name = title(*source, &capture.scene, camera);
-                light(ui, document, objects, &name, requests);
-                let lamp = match source {
-                    LightSource::Lamp(object) => Some(*object),
-                    _ => None,
-                };
-                let label = ui
-                    .selectable_label(lamp.is_some() && selected == lamp, &name)
-                    .on_hover_text("Selects this lamp");
-                requests.ask_all(lamp.filter(|_| label.clicked()).map(Request::Reveal));
-                ui.end_row();
-            }
-        });
+    });
+    ui.separator();
+    let grid = Grid::new("lights").num_columns(5).striped(true);
+    grid.show(ui, |ui| {
+        for (source, objects) in &lamps {
+            let name = title(*source, scene, camera);
+            light(ui, document, objects, &name, requests);
+            let lamp = match source {
+                LightSource::Lamp(object) => Some(*object),
+                _ => None,
+            };
+            let label = ui
+                .selectable_label(lamp.is_some() && selected == lamp, &name)
+                .on_hover_text("Selects this lamp");
+            requests.ask_all(lamp.filter(|_| label.clicked()).map(Request::Reveal));
+            ui.end_row();
+        }
     });
 }
 
@@ -81,7 +67,6 @@ fn title(source: LightSource, scene: &Scene, camera: Option<&Camera>) -> String 
     place.map_or_else(|| name.to_owned(), |place| format!("{name}, {place}"))
 }
 
-/// The light of one lamp.
 fn light(ui: &mut Ui, document: &Document, objects: &[usize], name: &str, requests: &mut Requests) {
     let before = document.gain(objects);
     let mut gain = before;

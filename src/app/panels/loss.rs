@@ -20,12 +20,6 @@ pub fn pane(ui: &mut Ui, progress: &Progress) {
     let held_out = curve(&progress.losses, |point| point.held_out);
     let fits = progress.fits.iter();
     let fits = logarithmic(fits.map(|point| [point.seconds, point.residual]));
-    let mut marks = Vec::new();
-    let mut end = 0.0;
-    for stage in &progress.stages {
-        end += stage.seconds;
-        marks.push((end, stage.name.clone()));
-    }
     Plot::new("loss")
         .legend(legend())
         .y_axis_formatter(|mark, _| at(mark.value))
@@ -38,8 +32,10 @@ pub fn pane(ui: &mut Ui, progress: &Progress) {
         .y_grid_spacer(decades)
         .y_axis_min_width(36.0)
         .show(ui, |plot| {
-            for (end, name) in marks {
-                let line = VLine::new(name, end).color(tokens.outline);
+            let mut end = 0.0;
+            for stage in &progress.stages {
+                end += stage.seconds;
+                let line = VLine::new(&stage.name, end).color(tokens.outline);
                 plot.vline(line.style(LineStyle::dashed_loose()));
             }
             // A single point has no line.

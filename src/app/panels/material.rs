@@ -6,76 +6,69 @@ use crate::app::document::Document;
 use crate::app::number::{number, triple};
 use crate::app::request::{Request, Requests};
 use crate::app::theme;
+use crate::app::view::Parts;
 use crate::inverse::estimate::{Estimate, ObjectEstimate};
+use crate::scene::Scene;
 use crate::session::edits::ObjectEdit;
 use crate::transport::material::DIELECTRIC;
-use egui::{Button, DragValue, Grid, Role, ScrollArea, Ui};
+use egui::{Button, DragValue, Grid, Role, Ui};
 use glam::Vec3;
 
-/// Names of the channels.
 const CHANNELS: [&str; 3] = ["red", "green", "blue"];
 
 /// Draws the pane.
-pub fn pane(ui: &mut Ui, document: &Document, selected: Option<u32>, requests: &mut Requests) {
-    if !document.objects_are_current() {
-        ui.weak("Reading the mesh again…");
-        return;
-    }
-    let Some(capture) = document.capture() else {
-        ui.weak(document.nothing_open());
+pub fn pane(ui: &mut Ui, parts: &mut Parts<'_>, scene: &Scene) {
+    let (document, requests) = (parts.document, &mut *parts.requests);
+    let selected = parts.view.selection.object;
+    let Some(object) = selected.map(|object| object as usize) else {
+        ui.weak("Select an object by a click in a picture or in the table");
+        buttons(ui, requests, &[Action::ResetEdits]);
         return;
     };
-    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        let Some(object) = selected.map(|object| object as usize) else {
-            ui.weak("Select an object by a click in a picture or in the table");
-            buttons(ui, requests, &[Action::ResetEdits]);
-            return;
-        };
-        let named = capture.scene.objects.get(object);
-        let known = named.zip(document.snapshot.estimate.objects.get(object));
-        let Some((named, found)) = known else {
-            ui.weak("Nothing is known of this object yet");
-            return;
-        };
-        let before = document.edits.object(object);
-        let mut edit = before;
-        ui.horizontal(|ui| {
-            ui.strong(&named.name);
-            if before != ObjectEdit::default() {
-                ui.colored_label(theme::tokens(ui).warning, "edited");
-            }
-        });
-        Grid::new("material").num_columns(2).show(ui, |ui| {
-            albedo(ui, found, &mut edit);
-            ui.end_row();
-            emission(ui, document, found, &mut edit);
-            ui.end_row();
-            gloss(ui, found, &mut edit);
-            ui.end_row();
-        });
-        if edit != before {
-            requests.ask(Request::Edit(object, edit));
+    let named = scene.objects.get(object);
+    let known = named.zip(document.snapshot.estimate.objects.get(object));
+    let Some((named, found)) = known else {
+        ui.weak("Nothing is known of this object yet");
+        return;
+    };
+    let before = document.edits.object(object);
+    let mut edit = before;
+    ui.horizontal(|ui| {
+        ui.strong(&named.name);
+        if before != ObjectEdit::default() {
+            ui.colored_label(theme::tokens(ui).warning, "edited");
         }
-        let actions = [
-            Action::SwitchLamp,
-            Action::SolveOn,
-            Action::ResetMaterial,
-            Action::ResetEdits,
-        ];
-        buttons(ui, requests, &actions);
-        let gloss = match found.lobe() {
-            Some((roughness, specular)) => {
-                let (roughness, specular) = (number(roughness), number(specular));
-                format!("roughness {roughness}, specular reflectance {specular}")
-            }
-            None => "no gloss".to_owned(),
-        };
-        let (albedo, emission) = (triple(found.albedo), triple(found.emission));
-        let unit = document.radiance_unit();
-        ui.weak(format!(
-            "found: albedo {albedo}, emission {emission} {unit}, {gloss}"
-        ));
     });
+    Grid::new("material").num_columns(2).show(ui, |ui| {
+        albedo(ui, found, &mut edit);
+        ui.end_row();
+        emission(ui, document, found, &mut edit);
+        ui.end_row();
+        gloss(ui, found, &mut edit);
+        ui.end_row();
+    });
+    if edit != before {
+        requests.ask(Request::Edit(object, edit));
+    }
+    let actions = [
+        Action::SwitchLamp,
+        Action::SolveOn,
+        Action::ResetMaterial,
+        Action::ResetEdits,
+    ];
+    buttons(ui, requests, &actions);
+    let gloss = match found.lobe() {
+        Some((roughness, specular)) => {
+            let (roughness, specular) = (number(roughness), number(specular));
+            format!("roughness {roughness}, specular reflectance {specular}")
+        }
+        None => "no gloss".to_owned(),
+    };
+    let (albedo, emission) = (triple(found.albedo), triple(found.emission));
+    let unit = document.radiance_unit();
+    ui.weak(format!(
+        "found: albedo {albedo}, emission {emission} {unit}, {gloss}"
+    ));
 }
 
 /// A number that is dragged or typed; true when it was changed.
@@ -84,7 +77,6 @@ fn drag(ui: &mut Ui, drag: DragValue<'_>, name: &str, help: &str) -> bool {
     named(response, Role::SpinButton, name).changed()
 }
 
-/// Colour of the surface.
 fn albedo(ui: &mut Ui, found: &ObjectEstimate, edit: &mut ObjectEdit) {
     let help = "Diffuse reflectance, 0 to 1 (no unit), linear; replaces a texture by one colour";
     ui.label("Albedo").on_hover_text(help);

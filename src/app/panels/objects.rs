@@ -1,16 +1,16 @@
 //! The table of objects: swatches, errors, pixels seen; sortable, with a filter, linked to the views.
 
 use crate::app::action::Action;
-use crate::app::choices::choices;
-use crate::app::controls::{named, switched};
-use crate::app::describe::described;
+use crate::app::controls::{choices, labelled, named, switched};
 use crate::app::document::Document;
 use crate::app::number::{number, triple};
 use crate::app::request::{Request, Requests};
 use crate::app::selection::Selection;
 use crate::app::theme;
 use crate::inverse::estimate::ObjectEstimate;
-use crate::math::color::luminance;
+use crate::math::color::{linear_to_srgb, luminance};
+use crate::scene::Object;
+use egui::ecolor::Hsva;
 use egui::{
     Align, Button, Color32, Key, Label, RichText, Role, Sense, Shape, Stroke, StrokeKind, TextEdit,
     Ui, vec2,
@@ -75,17 +75,13 @@ impl ObjectsTable {
                 SortBy::Pixels => object.seen_pixels as f64,
             })
         };
+        // Equal ones stay in the capture's order.
         rows.sort_by(|&a, &b| {
-            let by_key = match self.sort {
+            let (a, b) = if self.descending { (b, a) } else { (a, b) };
+            match self.sort {
                 SortBy::Name => names[a].cmp(names[b]),
                 _ => key(a).total_cmp(&key(b)),
-            };
-            let by_key = match self.descending {
-                true => by_key.reverse(),
-                false => by_key,
-            };
-            // Equal ones stay in the capture's order.
-            by_key.then(a.cmp(&b))
+            }
         });
         rows
     }
@@ -95,16 +91,12 @@ impl ObjectsTable {
 pub fn pane(
     ui: &mut Ui,
     document: &Document,
+    objects: &[Object],
     selection: &Selection,
     table: &mut ObjectsTable,
     requests: &mut Requests,
 ) {
-    let Some(capture) = document.capture() else {
-        ui.weak(document.nothing_open());
-        return;
-    };
     let (estimate, unit) = (&document.estimate, document.radiance_unit());
-    let objects = &capture.scene.objects;
     let area: f64 = objects.iter().map(|object| object.area).sum();
     let albedo = |index: usize| {
         let found = estimate.objects.get(index);
@@ -116,9 +108,8 @@ pub fn pane(
         .collect();
     let names: Vec<&str> = described.iter().map(String::as_str).collect();
     ui.horizontal(|ui| {
-        let label = ui.label("Filter");
-        ui.add(TextEdit::singleline(&mut table.filter).desired_width(120.0))
-            .labelled_by(label.id);
+        let filter = TextEdit::singleline(&mut table.filter);
+        labelled(ui, "Filter", filter.desired_width(120.0));
         ui.weak(format!("{} objects", names.len()));
         let common = document.estimate.common_error * 100.0;
         if common > 0.0 {
@@ -127,7 +118,18 @@ pub fn pane(
                 .on_hover_text(help);
         }
     });
-    regroup(ui, document, selection, table, requests);
+    ui.horizontal_wrapped(|ui| {
+        for action in [Action::JoinObjects, Action::CutOut] {
+            let help = format!("{}. The solve then starts over.", action.help());
+            requests.button_with_help(ui, action, Button::new(action.text()), &help);
+        }
+        let named = |object: u32| Some((object, &objects.get(object as usize)?.name));
+        if !document.can_regroup() {
+            ui.weak("Reading the mesh again…");
+        } else if let Some((object, name)) = selection.object.and_then(named) {
+            rename(ui, table, object, name, requests);
+        }
+    });
     let rows = table.rows(&names, &estimate.objects);
     let place = |object: u32| rows.iter().position(|&row| row == object as usize);
     let selected_row = selection.object.and_then(place);
@@ -176,37 +178,14 @@ pub fn pane(
     }
 }
 
-/// Buttons and a field that change which faces are one object, and its name.
-fn regroup(
-    ui: &mut Ui,
-    document: &Document,
-    selection: &Selection,
-    table: &mut ObjectsTable,
-    requests: &mut Requests,
-) {
-    ui.horizontal_wrapped(|ui| {
-        for action in [Action::JoinObjects, Action::CutOut] {
-            let help = format!("{}. The solve then starts over.", action.help());
-            requests.button_with_help(ui, action, Button::new(action.text()), &help);
-        }
-        let name = |object: u32| document.capture()?.scene.objects.get(object as usize);
-        if !document.can_regroup() {
-            ui.weak("Reading the mesh again…");
-        } else if let Some((object, named)) = (selection.object).and_then(|o| Some((o, name(o)?))) {
-            rename(ui, table, object, &named.name, requests);
-        }
-    });
-}
-
 /// The name of an object, to be typed over.
 fn rename(ui: &mut Ui, table: &mut ObjectsTable, object: u32, name: &str, requests: &mut Requests) {
     let mut typed = match table.renamed.take() {
         Some((known, typed)) if known == object => typed,
         _ => name.to_owned(),
     };
-    let label = ui.label("Name");
     let field = TextEdit::singleline(&mut typed).desired_width(110.0);
-    let response = ui.add(field).labelled_by(label.id);
+    let response = labelled(ui, "Name", field);
     if std::mem::take(&mut table.naming) {
         response.request_focus();
     }
@@ -310,6 +289,53 @@ fn swatch(ui: &mut Ui, color: Vec3) {
     (ui.painter()).rect(rect, 2.0, fill, stroke, StrokeKind::Inside);
 }
 
+/// The name of an object; a segment's says whether it is large or small (in the scene's area), and its colour.
+fn described(object: &Object, area: f64, albedo: Option<Vec3>) -> String {
+    if !object.name.starts_with("segment ") {
+        return object.name.clone();
+    }
+    let size = match object.area / area {
+        fraction if fraction > 0.05 => " large",
+        fraction if fraction < 0.003 => " small",
+        _ => "",
+    };
+    let color = albedo.map_or(String::new(), |albedo| format!(" {}", color_word(albedo)));
+    match (size, color.as_str()) {
+        ("", "") => object.name.clone(),
+        _ => format!("{},{size}{color}", object.name),
+    }
+}
+
+/// The word of a linear colour.
+fn color_word(albedo: Vec3) -> &'static str {
+    let srgb = albedo.clamp(Vec3::ZERO, Vec3::ONE).to_array();
+    let Hsva { h, s, v, .. } = Hsva::from_rgb(srgb.map(linear_to_srgb));
+    if v < 0.2 {
+        return "black";
+    }
+    if s < 0.2 {
+        return match v {
+            v if v < 0.45 => "dark grey",
+            v if v < 0.75 => "grey",
+            v if v < 0.9 => "light grey",
+            _ => "white",
+        };
+    }
+    match h * 360.0 {
+        20.0..70.0 if v < 0.6 => "brown",
+        20.0..70.0 if s < 0.45 => "beige",
+        20.0..45.0 => "orange",
+        45.0..70.0 => "yellow",
+        70.0..165.0 => "green",
+        165.0..195.0 => "cyan",
+        195.0..255.0 => "blue",
+        255.0..290.0 => "purple",
+        290.0..340.0 => "pink",
+        _ if s < 0.5 => "brown",
+        _ => "red",
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -332,5 +358,39 @@ mod tests {
         table.sort = SortBy::Pixels;
         table.descending = false;
         assert_eq!(table.rows(&names, &estimates), [0, 2]);
+    }
+
+    #[test]
+    fn segments_are_told_by_size_and_colour_and_named_objects_by_their_names() {
+        for (name, area, albedo, expected) in [
+            (
+                "segment 004",
+                20.0,
+                Some([0.8; 3]),
+                "segment 004, large white",
+            ),
+            (
+                "segment 040",
+                0.1,
+                Some([0.3, 0.02, 0.02]),
+                "segment 040, small red",
+            ),
+            (
+                "segment 041",
+                1.0,
+                Some([0.05, 0.1, 0.4]),
+                "segment 041, blue",
+            ),
+            ("segment 9", 1.0, None, "segment 9"),
+            ("wall", 20.0, Some([0.8; 3]), "wall"),
+        ] {
+            let object = Object {
+                name: name.to_owned(),
+                triangles: Vec::new(),
+                area,
+            };
+            let albedo = albedo.map(Vec3::from_array);
+            assert_eq!(described(&object, 100.0, albedo), expected);
+        }
     }
 }

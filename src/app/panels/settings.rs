@@ -6,43 +6,41 @@ use crate::app::request::{Request, Requests};
 use crate::app::theme;
 use crate::inverse::settings::{Kind, PARAMETERS, Parameter, Settings, Value};
 use crate::session::snapshot::Level;
-use egui::{Checkbox, ComboBox, DragValue, Grid, Role, ScrollArea, Ui};
+use egui::{Checkbox, ComboBox, DragValue, Grid, Role, Ui};
 
 /// Draws the pane.
 pub fn pane(ui: &mut Ui, before: &Settings, requests: &mut Requests) {
     let mut settings = before.clone();
-    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        let grid = Grid::new("settings").num_columns(3).striped(true);
-        grid.show(ui, |ui| {
-            for parameter in PARAMETERS {
-                let before = parameter.get(&settings);
-                let title = capitalized(&parameter.name.replace('_', " "));
-                let help = help(parameter);
-                ui.label(&title).on_hover_text(&help);
-                let mut value = before.clone();
-                ui.push_id(parameter.name, |ui| {
-                    widget(ui, parameter, &title, &mut value);
-                });
-                ui.horizontal(|ui| {
-                    if !parameter.unit.is_empty() {
-                        ui.weak(parameter.unit);
-                    }
-                    if parameter.live {
-                        ui.colored_label(theme::tokens(ui).good, "live")
-                            .on_hover_text("Takes effect at once");
-                    }
-                });
-                ui.end_row();
-                if value != before
-                    && let Err(message) = parameter.set(&mut settings, &value)
-                {
-                    requests.ask(Request::Say(Level::Warning, message));
+    let grid = Grid::new("settings").num_columns(3).striped(true);
+    grid.show(ui, |ui| {
+        for parameter in PARAMETERS {
+            let before = parameter.get(&settings);
+            let title = capitalized(&parameter.name.replace('_', " "));
+            let help = help(parameter);
+            ui.label(&title).on_hover_text(&help);
+            let mut value = before.clone();
+            ui.push_id(parameter.name, |ui| {
+                widget(ui, parameter, &title, &mut value);
+            });
+            ui.horizontal(|ui| {
+                if !parameter.unit.is_empty() {
+                    ui.weak(parameter.unit);
                 }
+                if parameter.live {
+                    ui.colored_label(theme::tokens(ui).good, "live")
+                        .on_hover_text("Takes effect at once");
+                }
+            });
+            ui.end_row();
+            if value != before
+                && let Err(message) = parameter.set(&mut settings, &value)
+            {
+                requests.ask(Request::Say(Level::Warning, message));
             }
-        });
-        ui.add_space(theme::GAP);
-        ui.weak("What is not live takes effect at the next reset.");
+        }
     });
+    ui.add_space(theme::GAP);
+    ui.weak("What is not live takes effect at the next reset.");
     if settings != *before {
         requests.ask(Request::Set(Box::new(settings)));
     }

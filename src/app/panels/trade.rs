@@ -1,12 +1,12 @@
 //! The trade of the open capture: error over seconds, where the running solve is on it, and where to stop.
 
 use crate::app::action::Action;
-use crate::app::document::Document;
+use crate::app::controls::labelled;
 use crate::app::panels::plot::{at, decades, hovered, legend};
 use crate::app::request::{Request, Requests};
 use crate::app::theme::{self, Tokens};
-use crate::app::trade::choice::{Stop, offers, stop_at};
-use crate::app::trade::{Limit, Measured, TradeView, Vertical};
+use crate::app::trade::{Measured, Stop, TradeView, Vertical, offers, stop_at};
+use crate::app::view::Parts;
 use crate::inverse::settings::{Preset, Settings};
 use crate::session::snapshot::Snapshot;
 use crate::study::trade::{Curve, Point, Trade};
@@ -19,13 +19,9 @@ const REACH: f32 = 14.0;
 const LEGEND: f32 = 160.0;
 
 /// Draws the pane.
-pub fn pane(
-    ui: &mut Ui,
-    document: &Document,
-    measured: &Measured,
-    view: &mut TradeView,
-    requests: &mut Requests,
-) {
+pub fn pane(ui: &mut Ui, parts: &mut Parts<'_>, measured: &Measured) {
+    let (document, requests) = (parts.document, &mut *parts.requests);
+    let view = &mut parts.view.panels.trade;
     measuring(ui, measured, &mut view.limit, requests);
     stops(ui, &document.settings, requests);
     let Some(trade) = &measured.trade else {
@@ -33,10 +29,10 @@ pub fn pane(
         return;
     };
     ui.horizontal_wrapped(|ui| {
-        for offer in offers(trade) {
-            let button = ui.small_button(offer.stop.words());
-            if button.on_hover_text(&offer.expected).clicked() {
-                requests.ask(Request::Stop(offer.curve, offer.stop));
+        for (stop, curve, expected) in offers(trade) {
+            let button = ui.small_button(stop.words());
+            if button.on_hover_text(expected).clicked() {
+                requests.ask(Request::Stop(curve, stop));
             }
         }
     });
@@ -55,7 +51,7 @@ pub fn pane(
 }
 
 /// The button that measures, and what it is at.
-fn measuring(ui: &mut Ui, measured: &Measured, limit: &mut Limit, requests: &mut Requests) {
+fn measuring(ui: &mut Ui, measured: &Measured, limit: &mut f64, requests: &mut Requests) {
     ui.horizontal(|ui| {
         let doing = measured.doing();
         let text = if doing.is_some() { "Cancel" } else { "Measure" };
@@ -68,10 +64,8 @@ fn measuring(ui: &mut Ui, measured: &Measured, limit: &mut Limit, requests: &mut
                 ui.label(doing);
             }
             None => {
-                let label = ui.label("in");
-                let seconds = DragValue::new(&mut limit.0);
-                ui.add(seconds.range(5.0..=3600.0).suffix(" s"))
-                    .labelled_by(label.id)
+                let seconds = DragValue::new(limit).range(5.0..=3600.0);
+                labelled(ui, "in", seconds.suffix(" s"))
                     .on_hover_text("Time for all presets together");
                 if measured.unsaved && ui.button("Keep").on_hover_text(KEEP).clicked() {
                     requests.ask(Request::KeepTrade);
@@ -87,15 +81,12 @@ const KEEP: &str = "Writes trade.csv, trade.json and trade.png into the folder w
 fn stops(ui: &mut Ui, before: &Settings, requests: &mut Requests) {
     let mut settings = before.clone();
     ui.horizontal(|ui| {
-        let label = ui.label("Stop at error");
         let error = DragValue::new(&mut settings.target_error).range(0.0..=100.0);
-        ui.add(error.speed(0.01).max_decimals(3).suffix(" %"))
-            .labelled_by(label.id)
+        let error = error.speed(0.01).max_decimals(3).suffix(" %");
+        labelled(ui, "Stop at error", error)
             .on_hover_text("Relative error of albedo that the estimate claims of itself; 0 leaves it to the preset");
-        let label = ui.label("Stop at time");
         let time = DragValue::new(&mut settings.time).range(0.0..=1e9);
-        ui.add(time.speed(0.1).suffix(" s"))
-            .labelled_by(label.id)
+        labelled(ui, "Stop at time", time.speed(0.1).suffix(" s"))
             .on_hover_text("Seconds of solving; 0 sets no limit");
     });
     if settings != *before {

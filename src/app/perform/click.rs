@@ -1,6 +1,6 @@
 //! What a click in a view does: it answers a pick, places an object, or selects.
 
-use crate::app::shell::sheet::Sheet;
+use crate::app::shell::sheet::{PROBE, Sheet};
 use crate::app::state::App;
 use crate::app::tool::{Clicked, Pick};
 use crate::session::command::{Command, OpenOptions};
@@ -39,7 +39,7 @@ impl App {
             Pick::Probe => {
                 let off = f64::from(capture.scene.diameter) * OFF_SURFACE;
                 let at = clicked.point + clicked.normal * off;
-                self.view.shell.sheet = Sheet::probe(&capture.name, at);
+                self.view.shell.sheet = Sheet::export(&capture.name, PROBE, at);
             }
             Pick::Length(None) => self.view.tool.pick(Pick::Length(Some(clicked.point))),
             Pick::Length(Some(first)) => {

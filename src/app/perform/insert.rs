@@ -68,10 +68,8 @@ impl App {
                 adding.problem = Some(why);
             }
         }
-        let wanted = std::mem::take(&mut adding.wanted);
-        let (ready, wait): (Vec<_>, Vec<_>) =
-            (wanted.into_iter()).partition(|file| insertions.models.ask(ctx, file));
-        adding.wanted = wait;
+        let is_read = |file: &mut PathBuf| insertions.models.ask(ctx, file);
+        let ready: Vec<_> = adding.wanted.extract_if(.., is_read).collect();
         for file in ready {
             let at = self.free_place();
             let insertions = &mut self.document.insertions;

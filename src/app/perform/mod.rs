@@ -10,8 +10,8 @@ mod trade;
 use crate::app::action::{Action, Needs};
 use crate::app::layout::{Pane, Workspace};
 use crate::app::model::lasso::Lasso;
-use crate::app::picture::compare::Mode;
 use crate::app::picture::copy::as_seen;
+use crate::app::picture::look::Mode;
 use crate::app::picture::quantity::Quantity;
 use crate::app::request::{Request, Requests};
 use crate::app::shell::dialogs::Ask;
@@ -37,39 +37,36 @@ impl App {
     /// Whether an action makes sense now.
     fn can(&self, action: Action) -> bool {
         let document = &self.document;
-        let open = document.capture().is_some();
         let ready = match action.needs() {
             Needs::Nothing => true,
-            Needs::Capture => open,
-            Needs::CurrentObjects => open && document.objects_are_current(),
+            Needs::Capture => document.capture().is_some(),
+            Needs::CurrentObjects => document.can_regroup(),
         };
-        ready && self.is_possible(action)
-    }
-
-    /// Whether an action that has what it needs would do something.
-    fn is_possible(&self, action: Action) -> bool {
-        let (document, selection) = (&self.document, &self.view.selection);
-        match action {
-            Action::Undo => document.history.can_undo(),
-            Action::Redo => document.history.can_redo(),
-            Action::SwitchLamp => self.edited_object().is_some_and(|o| document.is_lamp(o)),
-            Action::ResetMaterial => (self.edited_object())
-                .is_some_and(|o| document.edits.object(o) != ObjectEdit::default()),
-            Action::JoinObjects => document.can_regroup() && selection.all().len() > 1,
-            Action::RenameObject => document.can_regroup() && selection.object.is_some(),
-            Action::CutOut => document.can_regroup(),
-            Action::SolveOn => !document.edits.known().is_empty(),
-            Action::ResetEdits => !document.edits.is_empty(),
-            Action::ResetLights => document.lights_are_changed(),
-            Action::Place | Action::Duplicate | Action::Delete => {
-                document.insertions.chosen.is_some()
+        // What it needs is there; now whether it would do something.
+        let selection = &self.view.selection;
+        ready
+            && match action {
+                Action::Undo => document.history.can_undo(),
+                Action::Redo => document.history.can_redo(),
+                Action::SwitchLamp => self.edited_object().is_some_and(|o| document.is_lamp(o)),
+                Action::ResetMaterial => (self.edited_object())
+                    .is_some_and(|o| document.edits.object(o) != ObjectEdit::default()),
+                Action::JoinObjects => selection.all().len() > 1,
+                Action::RenameObject => selection.object.is_some(),
+                Action::SolveOn => !document.edits.known().is_empty(),
+                Action::ResetEdits => !document.edits.is_empty(),
+                Action::ResetLights => document.lights_are_changed(),
+                Action::Place | Action::Duplicate | Action::Delete => {
+                    document.insertions.chosen.is_some()
+                }
+                Action::MeasureTrade => {
+                    self.jobs.measured.measuring.is_some() || self.can_measure()
+                }
+                Action::Finish => matches!(document.snapshot.phase, Phase::Solving | Phase::Paused),
+                Action::SavePhotographs => self.can_write_photographs(),
+                Action::CancelPhotographs => self.jobs.batch.is_some(),
+                _ => true,
             }
-            Action::MeasureTrade => self.jobs.measured.measuring.is_some() || self.can_measure(),
-            Action::Finish => matches!(document.snapshot.phase, Phase::Solving | Phase::Paused),
-            Action::SavePhotographs => self.can_write_photographs(),
-            Action::CancelPhotographs => self.jobs.batch.is_some(),
-            _ => true,
-        }
     }
 
     /// Does all that was asked.
@@ -102,7 +99,7 @@ impl App {
             Request::OpenPath(path) => self.open_path(&path, ctx),
             Request::Resume(folder) => self.resume(folder),
             Request::CancelImport => self.jobs.importing = None,
-            Request::Browse(ask) => self.browse(ask, ctx),
+            Request::Browse(ask) => self.jobs.dialogs.open(ask, ctx),
             Request::Insert(file) => self.insert(file),
             Request::Choose(index) => self.document.insertions.chosen = Some(index),
             Request::Place(index, to) => {
@@ -140,13 +137,13 @@ impl App {
             return;
         }
         match action {
-            Action::OpenFolder => self.browse(Ask::Capture, ctx),
+            Action::OpenFolder => self.jobs.dialogs.open(Ask::Capture, ctx),
             Action::OpenRoom => self.open(Source::BuiltInRoom),
             Action::Sessions => self.view.shell.sheet = Sheet::Sessions,
             Action::StartPage => self.view.shell.start.asked ^= true,
             Action::Save => self.view.shell.sheet = Sheet::save(self.capture_name()),
             Action::Export => {
-                self.view.shell.sheet = Sheet::export(self.capture_name(), self.probe_point())
+                self.view.shell.sheet = Sheet::export(self.capture_name(), 0, self.probe_point())
             }
             Action::SaveLayers => self.view.shell.sheet = Sheet::layers(self.capture_name()),
             Action::SavePhotographs => {
@@ -291,18 +288,9 @@ impl App {
         shell.start.asked = false;
     }
 
-    /// Opens a file dialog.
-    fn browse(&mut self, ask: Ask, ctx: &Context) {
-        let ctx = ctx.clone();
-        self.jobs.dialogs.open(ask, move || ctx.request_repaint());
-    }
-
     /// Shows the remembered theme.
     pub fn apply_theme(&self, ctx: &Context) {
-        ctx.set_theme(match self.preferences.light {
-            true => Theme::Light,
-            false => Theme::Dark,
-        });
+        ctx.set_theme(Theme::from_dark_mode(!self.preferences.light));
     }
 
     /// Where a light probe is taken if no point was clicked: at the chosen inserted object, or at the 3D view's target.

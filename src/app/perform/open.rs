@@ -49,10 +49,9 @@ impl App {
             self.open(Source::Folder(out));
             return;
         }
-        let ctx = ctx.clone();
         let (from, into) = (source.to_owned(), out.clone());
         let work = move |progress: &Progress<()>| import(progress, &from, &into);
-        match Task::begin("import", move || ctx.request_repaint(), work) {
+        match Task::begin("import", ctx, work) {
             Ok(task) => self.jobs.importing = Some((out, task)),
             Err(error) => self.view.shell.start.problem = Some(error.to_string()),
         }

@@ -1,12 +1,15 @@
 //! Writing photographs in one go.
 
-use crate::app::batch::Batch;
 use crate::app::shell::sheet::Wanted;
+use crate::app::shell::status::Batch;
 use crate::app::state::App;
-use crate::session::photographs::Photographs;
+use crate::app::task::{Progress, Task};
+use crate::error::{Error, Result};
+use crate::session::photographs::{Photographs, WriteProgress, Written};
 use crate::session::snapshot::Level;
 use crate::transport::denoise::Denoiser;
-use std::path::PathBuf;
+use std::cell::Cell;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 impl App {
@@ -17,7 +20,6 @@ impl App {
         document.capture().is_some() && self.jobs.batch.is_none() && changed
     }
 
-    /// Begins to write photographs.
     pub(super) fn write_photographs(&mut self, wanted: &Wanted, ctx: &egui::Context) {
         let document = &self.document;
         let Some(capture) = document.capture().filter(|_| self.can_write_photographs()) else {
@@ -41,9 +43,18 @@ impl App {
             finish: document.insertions.finish,
         };
         let folder = PathBuf::from(wanted.folder.trim());
-        let ctx = ctx.clone();
-        match Batch::begin(work, folder, move || ctx.request_repaint()) {
-            Ok(batch) => self.jobs.batch = Some(batch),
+        let (into, wanted) = (folder.clone(), work.frames.len());
+        let begun = std::fs::create_dir_all(&folder).map_err(|error| Error::io(&folder, &error));
+        let write = move |progress: &Progress<_>| write(progress, &work, &into);
+        match begun.and_then(|()| Task::begin("photographs", ctx, write)) {
+            Ok(task) => {
+                self.jobs.batch = Some(Batch {
+                    folder,
+                    doing: None,
+                    wanted,
+                    task,
+                });
+            }
             Err(error) => self.say(Level::Error, error.to_string()),
         }
     }
@@ -75,4 +86,21 @@ impl App {
         let message = format!("ended after {done} of {wanted} photographs, written to {folder}");
         self.say(Level::Warning, message);
     }
+}
+
+/// Writes `folder`/NNN.*.
+fn write(progress: &Progress<WriteProgress>, work: &Photographs, folder: &Path) -> Result<Written> {
+    let shown = Cell::new(None);
+    let tell = |doing: WriteProgress| {
+        // Another photograph, or half a percent.
+        let is_news = |last: WriteProgress| {
+            last.frame != doing.frame || doing.fraction - last.fraction >= 0.005
+        };
+        if shown.get().is_none_or(is_news) {
+            shown.set(Some(doing));
+            progress.show(doing);
+        }
+        !progress.is_cancelled()
+    };
+    work.write(&|frame| folder.join(format!("{frame:03}")), &tell)
 }

@@ -48,7 +48,6 @@ impl App {
         self.regroup(Regroup::Join { objects });
     }
 
-    /// Gives an object another name.
     pub(super) fn rename_object(&mut self, object: u32, name: &str) {
         let name = name.trim().to_owned();
         let old = self.document.names(&[object]).pop();

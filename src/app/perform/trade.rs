@@ -1,11 +1,15 @@
 //! Measuring the trade of speed for exactness, and stopping where a person chose on it.
 
 use crate::app::state::App;
-use crate::app::trade::choice::{Stop, taken_over};
-use crate::app::trade::measuring::Measuring;
+use crate::app::task::{Progress, Task};
+use crate::app::trade::{Stop, taken_over};
+use crate::error::Result;
+use crate::inverse::settings::Settings;
 use crate::session::command::Command;
-use crate::session::snapshot::Level;
+use crate::session::snapshot::{Level, OpenCapture};
+use crate::study::trade::{Curve, SolveEvent, Trade, measure, plan};
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 impl App {
     /// Whether a measurement could begin: something is open and no solve runs.
@@ -15,17 +19,18 @@ impl App {
 
     /// Begins to measure the open capture's trade, or ends it, keeping what is measured.
     pub(super) fn measure_or_cancel(&mut self, ctx: &egui::Context) {
-        if let Some(measuring) = &self.jobs.measured.measuring {
-            return measuring.task.cancel();
+        if let Some((_, task)) = &self.jobs.measured.measuring {
+            return task.cancel();
         }
         let Some(capture) = self.document.capture().filter(|_| self.can_measure()) else {
             return;
         };
-        let ctx = ctx.clone();
-        let wake = move || ctx.request_repaint();
-        let (seed, limit) = (self.document.settings.seed, self.view.panels.trade.limit.0);
-        match Measuring::begin(capture.clone(), seed, limit, wake) {
-            Ok(measuring) => self.jobs.measured.measuring = Some(measuring),
+        let (seed, limit) = (self.document.settings.seed, self.view.panels.trade.limit);
+        let limit = Duration::try_from_secs_f64(limit).unwrap_or(Duration::MAX);
+        let [capture, measured] = [capture.clone(), capture.clone()];
+        let run = move |progress: &Progress<_>| run(progress, &measured, seed, limit);
+        match Task::begin("trade", ctx, run) {
+            Ok(task) => self.jobs.measured.measuring = Some((capture, task)),
             Err(error) => self.say(Level::Error, error.to_string()),
         }
     }
@@ -33,16 +38,16 @@ impl App {
     /// Takes in what was measured; a solve that begins ends the measurement, since each would slow the other.
     pub(in crate::app) fn take_trade(&mut self) {
         let measured = &mut self.jobs.measured;
-        let Some(measuring) = &mut measured.measuring else {
+        let Some((capture, task)) = &mut measured.measuring else {
             return;
         };
         if self.document.is_running() {
-            measuring.task.cancel();
+            task.cancel();
         }
         let current = self.document.capture();
-        let same = current.is_some_and(|c| Arc::ptr_eq(c, &measuring.capture));
-        let newest = measuring.task.newest().filter(|_| same);
-        let end = measuring.task.end();
+        let same = current.is_some_and(|current| Arc::ptr_eq(current, capture));
+        let newest = task.newest().filter(|_| same);
+        let end = task.end();
         if newest.is_some() {
             (measured.trade, measured.unsaved) = (newest, true);
         }
@@ -57,8 +62,8 @@ impl App {
     /// Forgets the trade of the capture before and reads that of the one that is open now.
     pub(in crate::app) fn trade_of_capture(&mut self) {
         let measured = &mut self.jobs.measured;
-        if let Some(measuring) = &measured.measuring {
-            measuring.task.cancel();
+        if let Some((_, task)) = &measured.measuring {
+            task.cancel();
         }
         (measured.trade, measured.unsaved) = (None, false);
         if let Some(capture) = self.document.capture()
@@ -104,4 +109,32 @@ impl App {
         self.document.settings = settings.clone();
         self.send(Command::Set(Box::new(settings)));
     }
+}
+
+fn run(
+    progress: &Progress<Arc<Trade>>,
+    capture: &OpenCapture,
+    seed: u64,
+    limit: Duration,
+) -> Result<()> {
+    progress.say("reading the truth, if there is one");
+    let subject = capture.subject()?;
+    let runs = plan::presets(&Settings {
+        seed,
+        ..Settings::default()
+    });
+    let (begun, hash, metric) = (Instant::now(), &capture.hash, &subject.metric);
+    let mut curves: Vec<Curve> = Vec::new();
+    let mut tell = |heard: SolveEvent| match heard {
+        SolveEvent::Begins(run) => progress.say(format!("measuring {}", run.name)),
+        SolveEvent::Ended(curve) => {
+            curves.push(curve.clone());
+            let (hash, measure, curves) = (Some(hash.clone()), metric.measure(), curves.clone());
+            let trade = Trade::new(&subject.name, hash, measure, begun.elapsed(), curves);
+            progress.show(Arc::new(trade));
+        }
+    };
+    let ended = || progress.is_cancelled();
+    measure(&subject.problem, metric, &runs, limit, &ended, &mut tell)?;
+    Ok(())
 }

@@ -46,48 +46,21 @@ fn color(value: Vec3, shading: Shading, range: f32, look: &Look) -> [u8; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::app::picture::quantity::Quantity;
     use crate::math::color::srgb_to_linear;
-    use crate::session::snapshot::Picture;
-    use std::sync::Arc;
-
-    fn seen(quantity: Quantity, value: Vec3, look: &Look) -> Color32 {
-        let drawn = Drawn {
-            quantity,
-            picture: Arc::new(Picture::from_fn(3, 2, |_, _| value)),
-            objects: None,
-            range: 1.0,
-        };
-        let image = as_seen(&drawn, look);
-        assert_eq!(image.size, [3, 2]);
-        image.pixels[5]
-    }
 
     #[test]
-    fn radiance_is_exposed_and_reflectance_is_not() {
+    fn radiance_is_exposed_reflectance_is_not_and_what_is_no_number_is_magenta() {
         let look = Look {
             exposure: 1.0,
             ..Look::default()
         };
-        let value = Vec3::splat(srgb_to_linear(128.0 / 255.0) * 0.5);
-        let grey = Color32::from_gray(128);
-        assert_eq!(seen(Quantity::Render, value, &look), grey);
-        assert_eq!(seen(Quantity::Albedo, value * 2.0, &look), grey);
-        let toned = Look {
-            tone: ToneCurve::Reinhard,
-            ..Look::default()
-        };
-        let one = seen(Quantity::Render, Vec3::ONE, &toned);
-        assert_eq!(one, Color32::from_gray(188));
-    }
-
-    #[test]
-    fn what_is_not_a_number_is_magenta_and_errors_have_a_sign() {
-        let look = Look::default();
-        let odd = seen(Quantity::Render, Vec3::splat(f32::NAN), &look);
-        assert_eq!(odd, Color32::from_rgb(255, 0, 255));
-        let [dark, bright] =
-            [Vec3::NEG_ONE, Vec3::ONE].map(|error| seen(Quantity::Error, error, &look));
-        assert!(dark.b() > dark.r() && bright.r() > bright.b());
+        let grey = Vec3::splat(srgb_to_linear(128.0 / 255.0));
+        for (value, shading, expected) in [
+            (grey * 0.5, Shading::Radiance, [128; 3]),
+            (grey, Shading::Reflectance, [128; 3]),
+            (Vec3::NAN, Shading::Radiance, [255, 0, 255]),
+        ] {
+            assert_eq!(color(value, shading, 1.0, &look), expected);
+        }
     }
 }

@@ -5,12 +5,10 @@ use crate::app::picture::look::Look;
 use crate::app::picture::quantity::Shading;
 use crate::app::picture::ramp;
 use crate::app::theme::Tokens;
-use crate::session::snapshot::Picture;
 use eframe::egui_wgpu::{CallbackResources, CallbackTrait, ScreenDescriptor};
 use egui::{Color32, PaintCallbackInfo, Rect};
 use std::collections::HashMap;
 use std::sync::Arc;
-use wgpu::util::DeviceExt;
 
 /// Pixels of a picture that a point of the screen shows at least, where they are blended; larger ones are shown as they are.
 const SMOOTH_STEP: f32 = 1.0 / 12.0;
@@ -51,9 +49,8 @@ pub struct PicturePaint {
 
 impl PicturePaint {
     fn uniform(&self, pixels_per_point: f32) -> ViewUniform {
-        let Drawn { picture, range, .. } = &self.drawn;
         let shading = self.drawn.quantity.shading();
-        let size = [picture.width, picture.height];
+        let size = self.drawn.size();
         let placement = self.look.placement(self.pane, size);
         let step = egui::Vec2::from(size.map(|side| side as f32)) / placement.size();
         let origin = (self.pane.min - placement.min) * step;
@@ -66,7 +63,7 @@ impl PicturePaint {
             exposure: self.look.exposure.exp2(),
             tone: self.look.tone as u32,
             shading: shading as u32,
-            range: *range,
+            range: self.drawn.range,
             selected: self.selected.map_or(-1.0, |object| object as f32),
             smooth: f32::from(u8::from(enlarged && shading == Shading::Radiance)),
             surround: rgba(self.tokens.surround),
@@ -196,16 +193,13 @@ impl CallbackTrait for PicturePaint {
         let Some(pictures) = resources.get_mut::<Pictures>() else {
             return Vec::new();
         };
-        let size = |picture: &Picture| [picture.width, picture.height];
         let known = pictures.slots.remove(&self.slot);
-        let slot = match known.filter(|slot| size(&slot.drawn.picture) == size(&self.drawn.picture))
-        {
+        let slot = match known.filter(|slot| slot.drawn.size() == self.drawn.size()) {
             None => Slot::new(device, queue, &pictures.pipeline, self),
+            Some(slot) if slot.shows(self) => slot,
             Some(mut slot) => {
-                if !slot.shows(self) {
-                    slot.drawn = self.drawn.clone();
-                    upload(queue, &slot.texture, &self.drawn);
-                }
+                slot.drawn = self.drawn.clone();
+                upload(queue, &slot.texture, &self.drawn);
                 slot
             }
         };
@@ -239,15 +233,10 @@ impl Slot {
         pipeline: &wgpu::RenderPipeline,
         paint: &PicturePaint,
     ) -> Self {
-        let picture = &paint.drawn.picture;
-        let texture = float_texture(device, "picture", [picture.width, picture.height]);
+        let texture = float_texture(device, "picture", paint.drawn.size());
         upload(queue, &texture, &paint.drawn);
-        let uniform = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some("picture view"),
-            contents: bytemuck::bytes_of(&paint.uniform(1.0)),
-            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-        });
-        let bind_group = bind(device, pipeline, &uniform, &texture);
+        let uniform = uniform_buffer::<ViewUniform>(device);
+        let bind_group = bind(device, pipeline, Some(&uniform), &view(&texture));
         Self {
             drawn: paint.drawn.clone(),
             texture,
@@ -263,22 +252,34 @@ impl Slot {
     }
 }
 
-/// Binds a uniform block and a texture to a pipeline that reads these two.
+/// A buffer for a uniform block.
+pub fn uniform_buffer<T>(device: &wgpu::Device) -> wgpu::Buffer {
+    device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(std::any::type_name::<T>()),
+        size: size_of::<T>() as u64,
+        usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
+}
+
+/// A view of a whole texture.
+pub fn view(texture: &wgpu::Texture) -> wgpu::TextureView {
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
+}
+
+/// Binds to a pipeline what it reads: a texture, and a uniform block before it where there is one.
 pub fn bind(
     device: &wgpu::Device,
     pipeline: &wgpu::RenderPipeline,
-    uniform: &wgpu::Buffer,
-    texture: &wgpu::Texture,
+    uniform: Option<&wgpu::Buffer>,
+    texture: &wgpu::TextureView,
 ) -> wgpu::BindGroup {
-    let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-    let resources = [
-        uniform.as_entire_binding(),
-        wgpu::BindingResource::TextureView(&view),
-    ];
-    let entries = [0, 1].map(|binding| wgpu::BindGroupEntry {
-        binding,
-        resource: resources[binding as usize].clone(),
-    });
+    let resources = (uniform.map(wgpu::Buffer::as_entire_binding).into_iter())
+        .chain([wgpu::BindingResource::TextureView(texture)]);
+    let entries = (0..).zip(resources);
+    let entries: Vec<_> = entries
+        .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
+        .collect();
     device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: None,
         layout: &pipeline.get_bind_group_layout(0),

@@ -4,29 +4,26 @@ use crate::app::document::Document;
 use crate::app::picture::canvas;
 use crate::app::picture::quantity::Quantity;
 use crate::app::picture::wipe::wipe;
-use crate::app::request::Requests;
 use crate::app::theme;
-use crate::app::view::ViewState;
-use egui::{Ui, UiBuilder};
+use crate::app::view::{Parts, ViewState};
+use egui::Ui;
 
 /// What it can be wiped against.
 const AGAINST: [Quantity; 3] = [Quantity::Photograph, Quantity::Naive, Quantity::Render];
 
 /// Draws the pane.
-pub fn pane(ui: &mut Ui, document: &Document, view: &mut ViewState, requests: &mut Requests) {
-    view.needed.note(Quantity::Composite);
-    theme::strip(ui, |ui| controls(ui, document, view));
-    let rect = ui.available_rect_before_wrap();
+pub fn pane(ui: &mut Ui, parts: &mut Parts<'_>) {
     let composite = Quantity::Composite;
+    parts.view.needed.note(composite);
+    theme::strip(ui, |ui| controls(ui, parts.document, parts.view));
+    let rect = ui.available_rect_before_wrap();
+    let view = &mut *parts.view;
     match view.compare.against.filter(|_| !view.look.photograph) {
         Some(left) => {
             view.needed.note(left);
-            wipe(ui, document, view, requests, rect, left, composite);
+            wipe(ui, parts, rect, [left, composite]);
         }
-        None => {
-            let mut ui = ui.new_child(UiBuilder::new().max_rect(rect));
-            canvas::pane(&mut ui, document, view, requests, composite);
-        }
+        None => canvas::pane(ui, parts, rect, composite),
     }
 }
 

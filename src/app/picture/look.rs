@@ -1,6 +1,6 @@
-//! How pictures are looked at: exposure, tone curve, and the zoom and cursor that all of them share.
+//! How pictures are looked at: exposure, tone curve, the zoom and cursor that all of them share, and which two are compared.
 
-use crate::app::choices::choices;
+use crate::app::controls::choices;
 use crate::app::picture::quantity::Quantity;
 use egui::{Pos2, Rect, Vec2};
 
@@ -52,7 +52,6 @@ impl Default for Look {
     }
 }
 
-/// Largest magnification.
 const MAX_ZOOM: f32 = 512.0;
 
 impl Look {
@@ -106,6 +105,49 @@ impl Look {
 pub fn fraction(rect: Rect, point: Pos2) -> Pos2 {
     let offset = point - rect.min;
     Pos2::new(offset.x / rect.width(), offset.y / rect.height())
+}
+
+choices! {
+    /// How two pictures are compared.
+    Mode {
+        Wipe, "Wipe", "A line that can be dragged divides them";
+        Flip, "Flip", "One at a time";
+        SideBySide, "Side by side", "Both in full";
+    }
+}
+
+/// The pictures compared, and how.
+#[derive(Debug, Clone)]
+pub struct Compare {
+    /// The left or first picture.
+    pub left: Quantity,
+    /// The right or second picture.
+    pub right: Quantity,
+    /// How.
+    pub mode: Mode,
+    /// Where the wipe is, as a fraction of the pane's width.
+    pub split: f32,
+    /// What the photograph as it was changed is wiped against, in its own pane.
+    pub against: Option<Quantity>,
+}
+
+impl Default for Compare {
+    fn default() -> Self {
+        Self {
+            left: Quantity::Photograph,
+            right: Quantity::Render,
+            mode: Mode::Wipe,
+            split: 0.5,
+            against: None,
+        }
+    }
+}
+
+impl Compare {
+    /// Swaps the two.
+    pub fn flip(&mut self) {
+        std::mem::swap(&mut self.left, &mut self.right);
+    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The pictures that can be looked at, and what their numbers mean.
 
-use crate::app::choices::choices;
+use crate::app::controls::choices;
 
 choices! {
     /// One of the pictures of a view.

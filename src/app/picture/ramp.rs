@@ -52,14 +52,12 @@ pub fn color(shading: Shading, t: f32) -> [f32; 3] {
 ///
 /// Looks at no more than about 4096 pixels. At least the smallest positive step, so that it may be divided by.
 pub fn range(picture: &Picture, shading: Shading) -> f32 {
-    let stride = (picture.pixels.len() / 4096).max(1);
-    let mut magnitudes: Vec<f32> = (picture.pixels.iter().step_by(stride))
-        .map(|p| p.element_sum() / 3.0)
-        .filter(|mean| shading == Shading::Signed || *mean >= 0.0)
-        .map(f32::abs)
-        .filter(|m| m.is_finite())
-        .collect();
-    round_up(percentile(&mut magnitudes, 0.98))
+    let magnitude = |p: &Vec3| {
+        let mean = p.element_sum() / 3.0;
+        let known = shading == Shading::Signed || mean >= 0.0;
+        known.then(|| mean.abs())
+    };
+    round_up(percentile(&picture.pixels, 4096, 0.98, magnitude))
 }
 
 /// The ends of scales, which stay while pictures fit them about.
@@ -79,16 +77,20 @@ impl Scales {
 
 /// Stops of exposure that put the 99th percentile of a picture's brightest channel at 1.
 pub fn automatic_exposure(pixels: &[Vec3]) -> f32 {
-    let stride = (pixels.len() / 16384).max(1);
-    let mut values: Vec<f32> = (pixels.iter().step_by(stride))
-        .map(|p| p.max_element())
-        .filter(|v| v.is_finite())
-        .collect();
-    let high = percentile(&mut values, 0.99);
+    let high = percentile(pixels, 16384, 0.99, |p| Some(p.max_element()));
     if high > 0.0 { -high.log2() } else { 0.0 }
 }
 
-fn percentile(values: &mut [f32], fraction: f32) -> f32 {
+/// The percentile of the finite values of about so many pixels; zero where there are none.
+fn percentile(
+    pixels: &[Vec3],
+    looked_at: usize,
+    fraction: f32,
+    value: impl Fn(&Vec3) -> Option<f32>,
+) -> f32 {
+    let stride = (pixels.len() / looked_at).max(1);
+    let values = pixels.iter().step_by(stride).filter_map(value);
+    let mut values: Vec<f32> = values.filter(|v| v.is_finite()).collect();
     if values.is_empty() {
         return 0.0;
     }

@@ -1,24 +1,23 @@
 //! Two pictures at a time: under a wipe, flipped, or side by side, with one exposure and tone curve.
 
 use crate::app::controls::{choose, named};
-use crate::app::document::Document;
 use crate::app::picture::canvas;
-use crate::app::picture::compare::{Compare, Mode};
+use crate::app::picture::look::{Compare, Mode};
 use crate::app::picture::quantity::Quantity;
-use crate::app::request::Requests;
 use crate::app::theme;
-use crate::app::view::ViewState;
+use crate::app::view::Parts;
 use egui::{Align2, Color32, FontId, Id, Rect, Role, Sense, Ui, UiBuilder, WidgetInfo, pos2, vec2};
 
 /// Draws the pane.
-pub fn pane(ui: &mut Ui, document: &Document, view: &mut ViewState, requests: &mut Requests) {
+pub fn pane(ui: &mut Ui, parts: &mut Parts<'_>) {
+    let view = &mut *parts.view;
     view.needed.note(view.compare.left);
     view.needed.note(view.compare.right);
     theme::strip(ui, |ui| controls(ui, &mut view.compare));
     let rect = ui.available_rect_before_wrap();
     let (left, right) = (view.look.held(view.compare.left), view.compare.right);
     let shown = match view.compare.mode {
-        Mode::Wipe => return wipe(ui, document, view, requests, rect, left, right),
+        Mode::Wipe => return wipe(ui, parts, rect, [left, right]),
         Mode::Flip => vec![(rect, left, "compared picture")],
         Mode::SideBySide => {
             let (a, b) = rect.split_left_right_at_fraction(0.5);
@@ -27,14 +26,12 @@ pub fn pane(ui: &mut Ui, document: &Document, view: &mut ViewState, requests: &m
         }
     };
     for (rect, quantity, name) in shown {
-        let Some(drawn) = view.drawn(document, quantity) else {
-            let mut ui = ui.new_child(UiBuilder::new().max_rect(rect));
-            canvas::missing(&mut ui, document, view, quantity);
+        let Some(drawn) = parts.view.drawn(parts.document, quantity) else {
+            canvas::missing(ui, parts, rect, quantity);
             continue;
         };
-        canvas::interact(ui, document, view, requests, rect, &drawn, name);
-        canvas::paint(ui, view, rect, &drawn, Id::unique(("compare", name)));
-        canvas::overlay(ui, document, view, rect, &drawn);
+        canvas::interact(ui, parts, rect, &drawn, name);
+        canvas::paint(ui, parts, rect, &drawn, Id::unique(("compare", name)));
         title(ui, rect, quantity, Align2::LEFT_TOP);
     }
 }
@@ -57,24 +54,15 @@ fn controls(ui: &mut Ui, compare: &mut Compare) {
 }
 
 /// Draws two pictures under a line that can be dragged.
-pub fn wipe(
-    ui: &mut Ui,
-    document: &Document,
-    view: &mut ViewState,
-    requests: &mut Requests,
-    rect: Rect,
-    left: Quantity,
-    right: Quantity,
-) {
-    let pair = [left, right].map(|quantity| view.drawn(document, quantity));
+pub fn wipe(ui: &mut Ui, parts: &mut Parts<'_>, rect: Rect, shown: [Quantity; 2]) {
+    let pair = shown.map(|quantity| parts.view.drawn(parts.document, quantity));
     let [Some(a), Some(b)] = &pair else {
-        let absent = if pair[0].is_none() { left } else { right };
-        let mut ui = ui.new_child(UiBuilder::new().max_rect(rect));
-        canvas::missing(&mut ui, document, view, absent);
+        let absent = shown[usize::from(pair[0].is_some())];
+        canvas::missing(ui, parts, rect, absent);
         return;
     };
-    canvas::interact(ui, document, view, requests, rect, a, "wiped pictures");
-    let split = &mut view.compare.split;
+    canvas::interact(ui, parts, rect, a, "wiped pictures");
+    let split = &mut parts.view.compare.split;
     let middle = pos2(rect.left() + rect.width() * *split, rect.center().y);
     let handle = Rect::from_center_size(middle, vec2(12.0, rect.height()));
     let response = ui
@@ -95,8 +83,7 @@ pub fn wipe(
     ] {
         let mut half = ui.new_child(UiBuilder::new().max_rect(rect));
         half.shrink_clip_rect(clip);
-        canvas::paint(&half, view, rect, drawn, Id::unique(slot));
-        canvas::overlay(&half, document, view, rect, drawn);
+        canvas::paint(&half, parts, rect, drawn, Id::unique(slot));
         title(&half, rect, drawn.quantity, align);
     }
     let (painter, tokens) = (ui.painter(), theme::tokens(ui));

@@ -3,10 +3,12 @@
 use crate::app::document::Document;
 use crate::app::number::capitalized;
 use crate::app::request::{Request, Requests};
-use crate::capture::reading::Reading;
 use crate::session::command::Command;
 use crate::session::snapshot::Phase;
 use egui::{Align2, Context, Window};
+
+/// What the button says that reads the capture without any option.
+const AS_USUAL: &str = "Read the files by their format's conventions";
 
 /// Says, until the solve has begun, that the capture is read wrongly, and offers the reading that fits.
 pub fn show(ctx: &Context, document: &Document, requests: &mut Requests) {
@@ -29,7 +31,11 @@ pub fn show(ctx: &Context, document: &Document, requests: &mut Requests) {
             ui.label(&error.problem);
             ui.add_space(8.0);
             ui.horizontal_wrapped(|ui| {
-                let reread = ui.button(button(&reading)).clicked();
+                let reread = match reading.words() {
+                    words if words.is_empty() => ui.button(AS_USUAL),
+                    words => ui.button(capitalized(&words)),
+                };
+                let reread = reread.clicked();
                 if reread {
                     let mut options = capture.options.clone();
                     options.reading = reading;
@@ -40,12 +46,4 @@ pub fn show(ctx: &Context, document: &Document, requests: &mut Requests) {
                 }
             });
         });
-}
-
-/// What the button that reads the capture so says.
-fn button(reading: &Reading) -> String {
-    match reading.words() {
-        words if words.is_empty() => "Read the files by their format's conventions".to_owned(),
-        words => capitalized(&words),
-    }
 }

@@ -21,10 +21,10 @@ pub enum Ask {
 pub struct Dialogs(Option<(Ask, Task<(), Option<PathBuf>>)>);
 
 impl Dialogs {
-    /// Opens a dialog unless one is open. `wake` is called when it has closed.
-    pub fn open(&mut self, ask: Ask, wake: impl Fn() + Send + Sync + 'static) {
+    /// Opens a dialog unless one is open.
+    pub fn open(&mut self, ask: Ask, ctx: &egui::Context) {
         if self.0.is_none() {
-            let task = Task::begin("file dialog", wake, move |_| Ok(choose(ask)));
+            let task = Task::begin("file dialog", ctx, move |_| Ok(choose(ask)));
             self.0 = task.ok().map(|task| (ask, task));
         }
     }

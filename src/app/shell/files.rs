@@ -1,25 +1,20 @@
 //! Draws the sheets: a typed path, a dialog where there is one.
 
-use crate::app::controls::{go_or_cancel, point};
-use crate::app::document::Document;
+use crate::app::action::Action;
+use crate::app::controls::{go_or_cancel, labelled, path_field, point};
 use crate::app::request::{Request, Requests};
-use crate::app::shell::path::path_and_buttons;
-use crate::app::shell::sheet::{FORMATS, Sheet, ending};
-use crate::app::shell::{photographs, sessions};
-use crate::app::view::ViewState;
+use crate::app::shell::dialogs::Ask;
+use crate::app::shell::sessions;
+use crate::app::shell::sheet::{FORMATS, Sheet, Wanted, ending};
+use crate::app::view::Parts;
 use crate::session::command::{Command, ExportFormat, ExportRequest};
 use egui::{DragValue, Id, Modal, Ui};
 use glam::DVec3;
 use std::path::PathBuf;
 
 /// Draws the sheet while it is open.
-pub fn show(
-    ctx: &egui::Context,
-    document: &Document,
-    view: &mut ViewState,
-    requests: &mut Requests,
-) {
-    let mut sheet = std::mem::take(&mut view.shell.sheet);
+pub fn show(ctx: &egui::Context, parts: &mut Parts<'_>) {
+    let mut sheet = std::mem::take(&mut parts.view.shell.sheet);
     if matches!(sheet, Sheet::Closed) {
         return;
     }
@@ -27,20 +22,16 @@ pub fn show(
         ui.set_width(420.0);
         match &mut sheet {
             Sheet::Closed => true,
-            Sheet::Sessions => sessions::sheet(ui, document, &mut view.shell.sessions, requests),
-            Sheet::Save(folder) => save(ui, folder, requests),
-            Sheet::Layers(file) => layers(ui, document, view, file, requests),
-            Sheet::Export { file, format, at } => {
-                export(ui, document, (file, format, at), requests)
-            }
-            Sheet::Length { found, metres } => length(ui, *found, metres, requests),
-            Sheet::Photographs(wanted) => {
-                photographs::sheet(ui, document, view.shown.frame, wanted, requests)
-            }
+            Sheet::Sessions => sessions::sheet(ui, parts),
+            Sheet::Save(folder) => save(ui, folder, parts.requests),
+            Sheet::Layers(file) => layers(ui, parts, file),
+            Sheet::Export { file, format, at } => export(ui, parts, (file, format, at)),
+            Sheet::Length { found, metres } => length(ui, *found, metres, parts.requests),
+            Sheet::Photographs(wanted) => photographs(ui, parts, wanted),
         }
     });
     if !modal.inner && !modal.should_close() {
-        view.shell.sheet = sheet;
+        parts.view.shell.sheet = sheet;
     }
 }
 
@@ -48,46 +39,34 @@ pub fn show(
 fn save(ui: &mut Ui, folder: &mut String, requests: &mut Requests) -> bool {
     ui.heading("Save results");
     ui.label("Estimate, report, loss, scene and pictures, as `relit solve` writes them.");
-    let (go, close) = path_and_buttons(ui, "Folder", folder, ("Save", true), requests);
-    if go {
-        let folder = PathBuf::from(folder.trim());
-        requests.ask(Request::Send(Command::Save(folder)));
-    }
+    let (path, close) = path_and_buttons(ui, "Folder", folder, ("Save", true), requests);
+    requests.ask_all(path.map(|folder| Request::Send(Command::Save(folder))));
     close
 }
 
 /// Draws the sheet for layers of light; true when it is to close.
-fn layers(
-    ui: &mut Ui,
-    document: &Document,
-    view: &mut ViewState,
-    file: &mut String,
-    requests: &mut Requests,
-) -> bool {
+fn layers(ui: &mut Ui, parts: &mut Parts<'_>, file: &mut String) -> bool {
     ui.heading("Save light layers");
     ui.label("One OpenEXR file with the light of each lamp, as the shown view has it so far.");
-    view.needed.layers = true;
-    let shown = view.shown.view(document);
+    parts.view.needed.layers = true;
+    let shown = parts.view.shown.view(parts.document);
     let layers = shown.and_then(|view| view.layers.as_ref());
     ui.weak(layers.map_or_else(
         || "Tracing the light of each lamp…".to_owned(),
         |layers| format!("{} samples a pixel so far", layers.samples),
     ));
     let ready = layers.is_some();
-    let (go, close) = path_and_buttons(ui, "File", file, ("Save", ready), requests);
-    if go {
-        let file = PathBuf::from(file.trim());
-        requests.ask(Request::Send(Command::SaveLayers(file)));
-    }
+    let (path, close) = path_and_buttons(ui, "File", file, ("Save", ready), parts.requests);
+    let save = path.map(|file| Request::Send(Command::SaveLayers(file)));
+    parts.requests.ask_all(save);
     close
 }
 
 /// Draws the sheet for exporting; true when it is to close.
 fn export(
     ui: &mut Ui,
-    document: &Document,
+    parts: &mut Parts<'_>,
     (file, chosen, at): (&mut String, &mut usize, &mut DVec3),
-    requests: &mut Requests,
 ) -> bool {
     ui.heading("Export");
     ui.horizontal_wrapped(|ui| {
@@ -107,17 +86,16 @@ fn export(
             ui.label("Point").on_hover_text(
                 "In the capture's coordinates; File > Light probe by click takes it from a view",
             );
-            let diameter = document.capture().map_or(1.0, |open| open.scene.diameter);
+            let capture = parts.document.capture();
+            let diameter = capture.map_or(1.0, |open| open.scene.diameter);
             point(ui, "Point", at, f64::from(diameter) * 1e-3);
         });
         format = ExportFormat::Probe { at: *at };
     }
-    let (go, close) = path_and_buttons(ui, "File", file, ("Export", true), requests);
-    if go {
-        let path = PathBuf::from(file.trim());
-        let request = ExportRequest { format, path };
-        requests.ask(Request::Send(Command::Export(request)));
-    }
+    let (path, close) = path_and_buttons(ui, "File", file, ("Export", true), parts.requests);
+    let request = path.map(|path| ExportRequest { format, path });
+    let export = request.map(|request| Request::Send(Command::Export(request)));
+    parts.requests.ask_all(export);
     close
 }
 
@@ -128,14 +106,77 @@ fn length(ui: &mut Ui, found: f64, metres: &mut f64, requests: &mut Requests) ->
         "The clicked length is {found:.3} now. Inserted objects keep their own size in metres."
     ));
     ui.horizontal(|ui| {
-        let label = ui.label("Length");
         let drag = DragValue::new(metres).range(1e-6..=1e6);
         let drag = drag.speed(found * 1e-3).max_decimals(4).suffix(" m");
-        ui.add(drag).labelled_by(label.id);
+        labelled(ui, "Length", drag);
     });
     let (clicked, cancel) = go_or_cancel(ui, "Set", *metres > 0.0);
     if clicked {
         requests.ask(Request::Length(found, *metres));
     }
     clicked || cancel
+}
+
+/// Draws the sheet that writes photographs with objects in them and in changed light; true when it is to close.
+fn photographs(ui: &mut Ui, parts: &mut Parts<'_>, wanted: &mut Wanted) -> bool {
+    let (document, requests) = (parts.document, &mut *parts.requests);
+    let frame = parts.view.shown.frame;
+    ui.heading("Save photographs");
+    let objects = document.insertions.visible().len();
+    ui.label(match (objects, document.edits.is_empty()) {
+        (0, true) => "Insert an object, or change a lamp or a material first.",
+        (0, false) => "At full size, in the light as you changed it.",
+        (_, true) => "At full size, with the inserted objects; naive composites and layers beside them.",
+        (_, false) => {
+            "At full size, in the light as you changed it and with the inserted objects; naive composites and \
+             layers beside them."
+        }
+    });
+    ui.horizontal(|ui| {
+        let count = document.frames();
+        ui.radio_value(&mut wanted.all, true, format!("All {count} photographs"));
+        let shown = format!("Photograph {} alone, as {frame:03}", frame + 1);
+        ui.radio_value(&mut wanted.all, false, shown);
+    });
+    ui.horizontal(|ui| {
+        let help = "Paths a pixel: four times as many halve the noise";
+        let label = ui.label("Samples a pixel").on_hover_text(help);
+        let drag = DragValue::new(&mut wanted.samples).range(1..=4096);
+        ui.add(drag).labelled_by(label.id).on_hover_text(help);
+        ui.checkbox(&mut wanted.denoise, "Denoise")
+            .on_hover_text("Smooths the noise of light that is added or changed, guided by surfaces; never the photograph itself");
+    });
+    let go = ("Write", requests.can(Action::SavePhotographs));
+    let (path, close) = path_and_buttons(ui, "Folder", &mut wanted.folder, go, requests);
+    requests.ask_all(path.map(|_| Request::Photographs(wanted.clone())));
+    close
+}
+
+/// Draws the path of a sheet and its buttons: what is typed, if that is to be gone on with, and whether to close.
+fn path_and_buttons(
+    ui: &mut Ui,
+    label: &str,
+    path: &mut String,
+    (go, ready): (&str, bool),
+    requests: &mut Requests,
+) -> (Option<PathBuf>, bool) {
+    let ask = match label {
+        "Folder" => Ask::SaveFolder,
+        _ => Ask::ExportFile,
+    };
+    let entered = ui.horizontal(|ui| {
+        let (field, entered) = path_field(ui, label, path, "", 270.0);
+        // Takes the keys at once.
+        if ui.memory(|memory| memory.focused().is_none()) {
+            field.request_focus();
+        }
+        if ui.button("Browse…").clicked() {
+            requests.ask(Request::Browse(ask));
+        }
+        entered
+    });
+    let ready = ready && !path.trim().is_empty();
+    let (clicked, cancel) = go_or_cancel(ui, go, ready);
+    let go = (clicked || entered.inner) && ready;
+    (go.then(|| path.trim().into()), go || cancel)
 }

@@ -2,18 +2,13 @@
 
 use crate::app::action::{Action, Menu};
 use crate::app::layout::{self, Pane, Workspace};
-use crate::app::request::Requests;
+use crate::app::view::Parts;
 use egui::{Button, Ui};
 use egui_tiles::Tree;
 
 /// Draws the menu bar, with the name of the capture and the workspaces at its end.
-pub fn bar(
-    ui: &mut Ui,
-    capture: Option<&str>,
-    workspace: Workspace,
-    tree: &mut Tree<Pane>,
-    requests: &mut Requests,
-) {
+pub fn bar(ui: &mut Ui, parts: &mut Parts<'_>, workspace: Workspace, tree: &mut Tree<Pane>) {
+    let requests = &mut *parts.requests;
     egui::MenuBar::new().ui(ui, |ui| {
         for menu in Menu::ALL {
             ui.menu_button(menu.name(), |ui| {
@@ -41,8 +36,8 @@ pub fn bar(
                 }
             }
             ui.separator();
-            if let Some(name) = capture {
-                ui.weak(name);
+            if let Some(capture) = parts.document.capture() {
+                ui.weak(&capture.name);
             }
         });
     });

@@ -7,8 +7,6 @@ pub mod keys;
 pub mod menu;
 pub mod notices;
 pub mod palette;
-pub mod path;
-pub mod photographs;
 pub mod sessions;
 pub mod sheet;
 pub mod size;
@@ -16,6 +14,13 @@ pub mod start;
 pub mod status;
 pub mod thumbnails;
 pub mod toolbar;
+
+use crate::session::snapshot::OpenCapture;
+use egui::TextureHandle;
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Instant, SystemTime};
 
 /// The state of what is around and above the panes.
 #[derive(Default)]
@@ -29,11 +34,11 @@ pub struct Shell {
     /// The start page.
     pub start: StartPage,
     /// The list of sessions.
-    pub sessions: sessions::Sessions,
+    pub sessions: Sessions,
     /// The strip of photographs.
-    pub thumbnails: thumbnails::Thumbnails,
+    pub thumbnails: Thumbnails,
     /// Memory in use.
-    pub memory: status::Memory,
+    pub memory: Memory,
     /// How large everything is.
     pub size: size::Size,
 }
@@ -47,4 +52,30 @@ pub struct StartPage {
     pub path: String,
     /// Why nothing was opened, with the remedy.
     pub problem: Option<String>,
+}
+
+/// What the list shows beside what the worker tells.
+#[derive(Default)]
+pub struct Sessions {
+    /// Whether the line that names the continued session was closed.
+    pub closed: bool,
+    /// The session whose button to remove it was clicked once.
+    removing: Option<PathBuf>,
+    pictures: HashMap<PathBuf, (SystemTime, Option<TextureHandle>)>,
+}
+
+/// Small textures of photographs, made as they come into view.
+#[derive(Default)]
+pub struct Thumbnails {
+    capture: Option<Arc<OpenCapture>>,
+    exposure: f32,
+    textures: HashMap<usize, TextureHandle>,
+    followed: usize,
+}
+
+/// Memory of this process, looked up now and then.
+#[derive(Default)]
+pub struct Memory {
+    looked_up: Option<Instant>,
+    bytes: u64,
 }

@@ -72,7 +72,7 @@ fn toast(ui: &mut Ui, event: &Event) -> bool {
     let frame = Frame::popup(ui.style()).stroke(egui::Stroke::new(1.0, color));
     let shown = frame.show(ui, |ui| {
         ui.horizontal(|ui| {
-            ui.colored_label(color, level_word(event.level));
+            ui.colored_label(color, format!("{:?}", event.level));
             ui.add(egui::Label::new(&event.message).wrap().selectable(false));
         });
     });
@@ -87,15 +87,6 @@ pub fn level_color(ui: &Ui, level: Level) -> Color32 {
         Level::Info => tokens.train,
         Level::Warning => tokens.warning,
         Level::Error => tokens.error,
-    }
-}
-
-/// Word of a level.
-pub fn level_word(level: Level) -> &'static str {
-    match level {
-        Level::Info => "Info",
-        Level::Warning => "Warning",
-        Level::Error => "Error",
     }
 }
 

@@ -2,57 +2,41 @@
 
 use crate::app::action::Action;
 use crate::app::controls::named;
-use crate::app::document::Document;
-use crate::app::request::{Request, Requests};
+use crate::app::request::Request;
+use crate::app::shell::Sessions;
 use crate::app::shell::status::ending;
-use crate::app::theme;
+use crate::app::view::Parts;
 use crate::session::command::Command;
 use crate::session::store::{Kept, State, THUMBNAIL};
 use egui::{Button, Image, Role, ScrollArea, TextureHandle, TextureOptions, Ui, vec2};
-use std::collections::HashMap;
-use std::path::PathBuf;
 use std::time::{Duration, SystemTime};
 
 /// Height of a session's picture, in points.
 const HEIGHT: f32 = 40.0;
 
-/// What the list shows beside what the worker tells.
-#[derive(Default)]
-pub struct Sessions {
-    /// Whether the line that names the continued session was closed.
-    pub closed: bool,
-    /// The session whose button to remove it was clicked once.
-    removing: Option<PathBuf>,
-    pictures: HashMap<PathBuf, (SystemTime, Option<TextureHandle>)>,
-}
-
 /// Draws the line that names the continued session.
-pub fn line(ui: &mut Ui, name: &str, sessions: &mut Sessions, requests: &mut Requests) {
+pub fn line(ui: &mut Ui, parts: &mut Parts<'_>, name: &str) {
     ui.horizontal(|ui| {
         ui.label(format!(
             "This goes on with {name}, with its changes and objects."
         ));
         let over = Button::new(Action::StartOver.text());
-        requests.button(ui, Action::StartOver, over);
+        parts.requests.button(ui, Action::StartOver, over);
         let close = ui.button("Hide").on_hover_text("Hides this line");
-        sessions.closed |= close.clicked();
+        parts.view.shell.sessions.closed |= close.clicked();
     });
 }
 
 /// Draws the sheet of all sessions; true when it is to close.
-pub fn sheet(
-    ui: &mut Ui,
-    document: &Document,
-    sessions: &mut Sessions,
-    requests: &mut Requests,
-) -> bool {
+pub fn sheet(ui: &mut Ui, parts: &mut Parts<'_>) -> bool {
     ui.heading("Sessions");
-    let chosen = list(ui, &document.snapshot.kept, sessions, requests);
+    let kept = &parts.document.snapshot.kept;
+    let chosen = list(ui, parts, kept);
     chosen || ui.button("Cancel").clicked()
 }
 
 /// Draws sessions; true when one is chosen.
-pub fn list(ui: &mut Ui, kept: &[Kept], sessions: &mut Sessions, requests: &mut Requests) -> bool {
+pub fn list(ui: &mut Ui, parts: &mut Parts<'_>, kept: &[Kept]) -> bool {
     if kept.is_empty() {
         ui.weak("None is kept yet");
         return false;
@@ -60,13 +44,14 @@ pub fn list(ui: &mut Ui, kept: &[Kept], sessions: &mut Sessions, requests: &mut 
     let mut chosen = false;
     ScrollArea::vertical().max_height(420.0).show(ui, |ui| {
         for session in kept {
-            ui.horizontal(|ui| chosen |= row(ui, sessions, session, requests));
+            ui.horizontal(|ui| chosen |= row(ui, parts, session));
         }
     });
     chosen
 }
 
-fn row(ui: &mut Ui, sessions: &mut Sessions, session: &Kept, requests: &mut Requests) -> bool {
+fn row(ui: &mut Ui, parts: &mut Parts<'_>, session: &Kept) -> bool {
+    let (sessions, requests) = (&mut parts.view.shell.sessions, &mut *parts.requests);
     let place = vec2(HEIGHT * 1.5, HEIGHT);
     match sessions.picture(ui, session) {
         Some(texture) => ui.add(Image::new(&texture).fit_to_exact_size(place)),
@@ -119,7 +104,6 @@ impl Sessions {
     }
 }
 
-/// How long ago something was.
 fn age(at: SystemTime) -> String {
     let seconds = at.elapsed().unwrap_or(Duration::ZERO).as_secs();
     match seconds {
@@ -129,6 +113,3 @@ fn age(at: SystemTime) -> String {
         _ => format!("{} days ago", seconds / 86_400),
     }
 }
-
-/// Height of the line in the window.
-pub const LINE: f32 = theme::ROW + 8.0;

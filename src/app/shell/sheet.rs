@@ -76,6 +76,9 @@ pub const FORMATS: [(&str, &str, ExportFormat); 6] = [
     ),
 ];
 
+/// Which of them is the light at a point.
+pub const PROBE: usize = FORMATS.len() - 1;
+
 /// The usual ending of a format's files.
 pub fn ending(format: usize) -> &'static str {
     FORMATS[format].2.endings()[0]
@@ -92,19 +95,10 @@ impl Sheet {
         Self::Layers(format!("{}-lights.exr", file_name(name)))
     }
 
-    /// The sheet for exporting; `at` is where a probe would be taken.
-    pub fn export(name: &str, at: DVec3) -> Self {
-        Self::Export {
-            file: format!("{}.{}", file_name(name), ending(0)),
-            format: 0,
-            at,
-        }
-    }
-
-    /// The sheet for exporting the light at a point.
-    pub fn probe(name: &str, at: DVec3) -> Self {
-        let format = FORMATS.len() - 1;
-        let file = format!("{}-light.{}", file_name(name), ending(format));
+    /// The sheet for exporting in one of [`FORMATS`]; `at` is where a probe would be taken.
+    pub fn export(name: &str, format: usize, at: DVec3) -> Self {
+        let light = if format == PROBE { "-light" } else { "" };
+        let file = format!("{}{light}.{}", file_name(name), ending(format));
         Self::Export { file, format, at }
     }
 

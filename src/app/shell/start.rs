@@ -2,26 +2,20 @@
 
 use crate::app::action::Action;
 use crate::app::controls::path_field;
-use crate::app::document::Document;
 use crate::app::request::{Request, Requests};
 use crate::app::shell::{Shell, sessions};
 use crate::app::theme;
+use crate::app::view::Parts;
 use crate::session::command::Source;
 use egui::{Align, Button, Frame, Layout, RichText, Stroke, Ui, vec2};
 use std::path::PathBuf;
 
 /// Draws the page; `importing` says how far the import of a scan is.
-pub fn page(
-    ui: &mut Ui,
-    document: &Document,
-    shell: &mut Shell,
-    importing: Option<String>,
-    recent: &[PathBuf],
-    requests: &mut Requests,
-) {
+pub fn page(ui: &mut Ui, parts: &mut Parts<'_>, importing: Option<String>, recent: &[PathBuf]) {
     let tokens = theme::tokens(ui);
     ui.painter().rect_filled(ui.max_rect(), 0.0, tokens.panel);
     ui.vertical_centered(|ui| {
+        let (shell, requests) = (&mut parts.view.shell, &mut *parts.requests);
         ui.set_max_width(560.0);
         ui.add_space((ui.available_height() * 0.12).max(8.0));
         ui.label(RichText::new("relit").size(34.0).color(tokens.strong));
@@ -56,12 +50,12 @@ pub fn page(
                 requests.ask(Request::Open(Source::Folder(folder.clone())));
             }
         }
-        let kept = &document.snapshot.kept;
+        let kept = &parts.document.snapshot.kept;
         if !kept.is_empty() {
             ui.add_space(10.0);
             ui.weak("Sessions");
             let newest = &kept[..kept.len().min(4)];
-            sessions::list(ui, newest, &mut shell.sessions, requests);
+            sessions::list(ui, parts, newest);
         }
     });
 }

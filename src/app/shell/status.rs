@@ -1,23 +1,20 @@
 //! The status bar: what the worker does, how fast, how long still, and with how much memory.
 
-use crate::app::batch::Batch;
-use crate::app::document::Document;
+use crate::app::action::Action;
+use crate::app::controls::named;
 use crate::app::number::number;
 use crate::app::request::Requests;
-use crate::app::shell::photographs;
+use crate::app::shell::Memory;
+use crate::app::task::Task;
 use crate::app::theme;
+use crate::app::view::Parts;
 use crate::inverse::solver::Termination;
+use crate::session::photographs::{WriteProgress, Written};
 use crate::session::save::memory::resident_bytes;
 use crate::session::snapshot::Phase;
-use egui::{ProgressBar, RichText, Ui};
+use egui::{Button, ProgressBar, RichText, Role, Ui};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
-
-/// Memory of this process, looked up now and then.
-#[derive(Default)]
-pub struct Memory {
-    looked_up: Option<Instant>,
-    bytes: u64,
-}
 
 impl Memory {
     /// Resident bytes, at most two seconds old.
@@ -31,16 +28,16 @@ impl Memory {
     }
 }
 
-/// Word of a phase.
-fn phase_word(phase: &Phase) -> &'static str {
-    match phase {
-        Phase::Idle => "Idle",
-        Phase::Loading => "Loading",
-        Phase::Solving => "Solving",
-        Phase::Paused => "Paused",
-        Phase::Finished(why) => ending(*why),
-        Phase::Failed => "Failed",
-    }
+/// Photographs that are being written.
+pub struct Batch {
+    /// The folder that they are written into.
+    pub folder: PathBuf,
+    /// What it is at.
+    pub doing: Option<WriteProgress>,
+    /// How many photographs it is to write.
+    pub wanted: usize,
+    /// The work.
+    pub task: Task<WriteProgress, Written>,
 }
 
 /// How a solve ended, in words.
@@ -56,15 +53,9 @@ pub fn ending(why: Termination) -> &'static str {
 }
 
 /// Draws the bar.
-pub fn bar(
-    ui: &mut Ui,
-    document: &Document,
-    batch: Option<&Batch>,
-    memory: &mut Memory,
-    requests: &mut Requests,
-) {
-    let tokens = theme::tokens(ui);
-    let bytes = memory.bytes();
+pub fn bar(ui: &mut Ui, parts: &mut Parts<'_>, batch: Option<&Batch>) {
+    let (document, tokens) = (parts.document, theme::tokens(ui));
+    let bytes = parts.view.shell.memory.bytes();
     let snapshot = &document.snapshot;
     let color = match snapshot.phase {
         Phase::Solving | Phase::Loading => tokens.accent,
@@ -73,8 +64,11 @@ pub fn bar(
         Phase::Finished(_) => tokens.good,
     };
     ui.horizontal_centered(|ui| {
-        let phase = RichText::new(phase_word(&snapshot.phase));
-        ui.label(phase.color(color).strong());
+        let phase = match &snapshot.phase {
+            Phase::Finished(why) => ending(*why).to_owned(),
+            phase => format!("{phase:?}"),
+        };
+        ui.label(RichText::new(phase).color(color).strong());
         let progress = &snapshot.progress;
         if document.is_running() {
             if let Some(fraction) = progress.fraction {
@@ -89,7 +83,7 @@ pub fn bar(
             ui.label(format!("after stage {count}: {}", stage.name));
         }
         if let Some(batch) = batch {
-            photographs::progress(ui, batch, requests);
+            photographs(ui, batch, parts.requests);
         }
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             ui.label(format!("{} MB", bytes / 1_000_000))
@@ -112,7 +106,22 @@ pub fn bar(
     });
 }
 
-/// Seconds as people read them.
+/// How far the photographs are, with a button that ends them.
+fn photographs(ui: &mut Ui, batch: &Batch, requests: &mut Requests) {
+    let folder = format!("Writes into {}", batch.folder.display());
+    ui.separator();
+    // The button comes first, where it stays while the rest changes.
+    let (action, cancel) = (Action::CancelPhotographs, Button::new("Cancel").small());
+    let cancel = requests.button(ui, action, cancel);
+    named(cancel, Role::Button, action.text());
+    if let Some(doing) = batch.doing {
+        let bar = ProgressBar::new(doing.fraction).desired_width(90.0);
+        ui.add(bar.desired_height(8.0)).on_hover_text(&folder);
+        ui.label(format!("photograph {}", doing.frame + 1))
+            .on_hover_text(folder);
+    }
+}
+
 fn duration(seconds: f64) -> String {
     let seconds = seconds.max(0.0);
     let (minutes, hours) = ((seconds / 60.0).floor(), (seconds / 3600.0).floor());

@@ -1,71 +1,38 @@
 //! The strip of photographs.
 
 use crate::app::controls::named;
-use crate::app::document::Document;
-use crate::app::request::{Request, Requests};
-use crate::app::shown::Shown;
+use crate::app::request::Request;
+use crate::app::shell::Thumbnails;
 use crate::app::theme;
+use crate::app::view::Parts;
 use crate::capture::photograph::Photograph;
 use crate::math::color::to_srgb8;
-use crate::session::snapshot::OpenCapture;
 use egui::{
-    Color32, ColorImage, Image, Role, ScrollArea, Sense, StrokeKind, TextureHandle, TextureOptions,
-    Ui, vec2,
+    Color32, ColorImage, Image, Role, ScrollArea, Sense, StrokeKind, TextureOptions, Ui, vec2,
 };
-use std::collections::HashMap;
 use std::sync::Arc;
-
-/// Small textures of photographs, made as they come into view.
-#[derive(Default)]
-pub struct Thumbnails {
-    capture: Option<Arc<OpenCapture>>,
-    exposure: f32,
-    textures: HashMap<usize, TextureHandle>,
-    followed: usize,
-}
-
-impl Thumbnails {
-    fn texture(&mut self, ui: &Ui, frame: usize, photograph: &Photograph) -> TextureHandle {
-        let texture = self.textures.entry(frame).or_insert_with(|| {
-            let name = format!("photograph {frame}");
-            let image = small(photograph, self.exposure);
-            ui.ctx().load_texture(name, image, TextureOptions::LINEAR)
-        });
-        texture.clone()
-    }
-}
 
 /// A photograph reduced to a thumbnail's height by taking every n-th pixel.
 fn small(photograph: &Photograph, exposure: f32) -> ColorImage {
     let stride = (photograph.height / (theme::THUMBNAIL as u32 * 2)).max(1) as usize;
-    let (width, height) = (photograph.width as usize, photograph.height as usize);
-    let columns = width.div_ceil(stride);
-    let mut bytes = Vec::with_capacity(columns * height.div_ceil(stride) * 3);
-    for row in photograph.pixels.chunks(width.max(1)).step_by(stride) {
-        for pixel in row.iter().step_by(stride) {
-            bytes.extend(to_srgb8(*pixel, exposure));
-        }
-    }
-    let rows = bytes.len() / (3 * columns.max(1));
-    ColorImage::from_rgb([columns, rows], &bytes)
+    let rows = photograph.pixels.chunks(photograph.width.max(1) as usize);
+    let rows = rows.step_by(stride);
+    let size = [(photograph.width as usize).div_ceil(stride), rows.len()];
+    let pixels = rows.flat_map(|row| row.iter().step_by(stride));
+    let bytes: Vec<u8> = pixels.flat_map(|&p| to_srgb8(p, exposure)).collect();
+    ColorImage::from_rgb(size, &bytes)
 }
 
 /// Draws the strip.
-pub fn strip(
-    ui: &mut Ui,
-    document: &Document,
-    shown: &Shown,
-    exposure: f32,
-    thumbnails: &mut Thumbnails,
-    requests: &mut Requests,
-) {
-    let Some(capture) = document.capture() else {
+pub fn strip(ui: &mut Ui, parts: &mut Parts<'_>) {
+    let Some(capture) = parts.document.capture() else {
         return;
     };
+    let thumbnails = &mut parts.view.shell.thumbnails;
     if !matches!(&thumbnails.capture, Some(known) if Arc::ptr_eq(known, capture)) {
         *thumbnails = Thumbnails {
             capture: Some(capture.clone()),
-            exposure: exposure.exp2(),
+            exposure: parts.view.look.exposure.exp2(),
             ..Thumbnails::default()
         };
     }
@@ -78,14 +45,18 @@ pub fn strip(
                 let (rect, response) = ui.allocate_exact_size(size, Sense::click());
                 let name = format!("Photograph {}", frame + 1);
                 let response = named(response, Role::Button, &name);
-                let current = shown.photograph() == Some(frame);
+                let current = parts.view.shown.photograph() == Some(frame);
                 if current && thumbnails.followed != frame {
                     response.scroll_to_me(None);
                     thumbnails.followed = frame;
                 }
                 if ui.is_rect_visible(rect) {
-                    let texture = thumbnails.texture(ui, frame, photograph);
-                    Image::new(&texture).paint_at(ui, rect);
+                    let exposure = thumbnails.exposure;
+                    let texture = thumbnails.textures.entry(frame).or_insert_with(|| {
+                        let (name, image) = (name.clone(), small(photograph, exposure));
+                        ui.ctx().load_texture(name, image, TextureOptions::LINEAR)
+                    });
+                    Image::new(&*texture).paint_at(ui, rect);
                     let color = match (current, response.hovered()) {
                         (true, _) => tokens.accent,
                         (false, true) => tokens.strong,
@@ -97,7 +68,7 @@ pub fn strip(
                 let help = format!("{name}, in files {frame:03}");
                 if response.on_hover_text(help).clicked() {
                     thumbnails.followed = frame;
-                    requests.ask(Request::Show(frame));
+                    parts.requests.ask(Request::Show(frame));
                 }
             }
         });

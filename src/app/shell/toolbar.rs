@@ -2,21 +2,16 @@
 
 use crate::app::action::Action;
 use crate::app::controls::{choose, named};
-use crate::app::document::Document;
 use crate::app::picture::look::Look;
 use crate::app::request::Requests;
-use crate::app::shown::Shown;
 use crate::app::theme;
+use crate::app::view::Parts;
 use egui::{Button, Key, Role, Slider, Ui, vec2};
 
 /// Draws the bar.
-pub fn bar(
-    ui: &mut Ui,
-    document: &Document,
-    shown: &Shown,
-    look: &mut Look,
-    requests: &mut Requests,
-) {
+pub fn bar(ui: &mut Ui, parts: &mut Parts<'_>) {
+    let (document, requests) = (parts.document, &mut *parts.requests);
+    let (shown, look) = (&parts.view.shown, &mut parts.view.look);
     ui.horizontal_wrapped(|ui| {
         let run = match document.is_running() {
             true => "Pause",
