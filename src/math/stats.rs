@@ -94,6 +94,14 @@ pub fn upper_median(values: &mut [f32]) -> Option<f32> {
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
 
+/// Pearson's chi-square of counts in cells of equal probability.
+#[cfg(test)]
+pub(super) fn chi_square(cells: &[u32]) -> f64 {
+    let expected = f64::from(cells.iter().sum::<u32>()) / cells.len() as f64;
+    let squares = cells.iter().map(|&n| (f64::from(n) - expected).powi(2));
+    squares.sum::<f64>() / expected
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

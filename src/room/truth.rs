@@ -1,5 +1,6 @@
 //! The ground truth of the room, in the format that `relit evaluate` reads.
 
+use crate::math::cumulative::Cumulative;
 use crate::math::frame::Frame;
 use crate::math::picture::Picture;
 use crate::math::rng::Stream;
@@ -154,34 +155,25 @@ fn mean_over_area(
 ) -> Vec3 {
     let scene = &world.scene;
     let triangles = &scene.objects[object].triangles;
-    let cumulative_areas: Vec<f64> = triangles
-        .iter()
-        .scan(0.0, |sum, &t| {
-            *sum += f64::from(scene.areas[t as usize]);
-            Some(*sum)
-        })
-        .collect();
-    let total = cumulative_areas.last().copied().unwrap_or(0.0);
+    let area = |&triangle: &u32| f64::from(scene.areas[triangle as usize]);
+    let areas = Cumulative::new(triangles.iter().map(area));
     let values: Vec<Vec3> = (0..SAMPLES)
         .into_par_iter()
         .map(|index| {
             let mut stream = Stream::new(0, object as u64, 0, index);
             // Strata of equal area.
-            let area = (index as f64 + stream.uniform_f64()) / SAMPLES as f64 * total;
-            let chosen = cumulative_areas
-                .partition_point(|&sum| sum <= area)
-                .min(triangles.len() - 1);
+            let area = (index as f64 + stream.uniform_f64()) / SAMPLES as f64 * areas.total();
+            let Some(chosen) = areas.index_at(area) else {
+                return Vec3::ZERO;
+            };
             let [b1, b2] = uniform_triangle(stream.uniform2());
-            let triangle = triangles[chosen];
-            quantity(
-                &Hit {
-                    t: 0.0,
-                    triangle,
-                    b1,
-                    b2,
-                },
-                &mut stream,
-            )
+            let hit = Hit {
+                triangle: triangles[chosen],
+                b1,
+                b2,
+                ..Hit::default()
+            };
+            quantity(&hit, &mut stream)
         })
         .collect();
     let sum: DVec3 = values.iter().map(|v| v.as_dvec3()).sum();

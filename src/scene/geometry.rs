@@ -40,7 +40,7 @@ impl Ray {
 }
 
 /// Where a ray met a triangle.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Hit {
     /// Distance along the ray in units of its direction.
     pub t: f32,

@@ -4,7 +4,6 @@ pub mod bvh;
 pub mod camera;
 pub mod depth;
 pub mod geometry;
-pub mod ids;
 pub mod prepare;
 pub mod texels;
 pub mod visibility;
@@ -16,8 +15,8 @@ use bvh::Bvh;
 use camera::Camera;
 use geometry::{Hit, Ray};
 use glam::{DVec3, Vec3};
-use ids::IdBuffers;
 use std::sync::OnceLock;
+use visibility::IdBuffers;
 
 /// Geometry and cameras of a capture, in metres relative to [`Scene::origin`].
 #[derive(Debug)]

@@ -2,6 +2,7 @@
 
 use crate::math::rng::Stream;
 use crate::scene::camera::Camera;
+use crate::transport::arrival::RayCount;
 use crate::transport::path::{PathOptions, radiance};
 use crate::transport::world::World;
 use glam::{DVec3, Vec2, Vec3};
@@ -33,7 +34,7 @@ impl Film {
             width,
             height,
             samples: 0,
-            sums: vec![DVec3::ZERO; width as usize * height as usize],
+            sums: vec![DVec3::ZERO; camera.pixels()],
             rays: 0,
             rejected: 0,
         }
@@ -81,31 +82,23 @@ impl Film {
     ) {
         let first = self.samples;
         let width = self.width as usize;
-        let top = rows.start as usize;
-        let pixels = top * width..rows.end.min(self.height) as usize * width;
-        let counts: Vec<(u64, u64)> = self.sums[pixels]
-            .par_chunks_mut(width.max(1))
-            .enumerate()
-            .map(|(row, sums)| {
-                let row = top + row;
-                let (mut rays, mut rejected) = (0, 0);
-                for (column, sum) in sums.iter_mut().enumerate() {
-                    let pixel = (row * width + column) as u64;
-                    for index in first..first + samples {
-                        let mut stream = Stream::new(seed, frame, pixel, u64::from(index));
-                        let [dx, dy] = stream.uniform2();
-                        let ray = camera.ray(Vec2::new(column as f32 + dx, row as f32 + dy));
-                        let sample = radiance(world, &ray, &mut stream, options);
-                        *sum += sample.radiance.as_dvec3();
-                        rays += u64::from(sample.rays);
-                        rejected += u64::from(sample.rejected);
-                    }
-                }
-                (rays, rejected)
-            })
-            .collect();
-        self.rays += counts.iter().map(|c| c.0).sum::<u64>();
-        self.rejected += counts.iter().map(|c| c.1).sum::<u64>();
+        let pixels = rows.start as usize * width..rows.end.min(self.height) as usize * width;
+        let add = |(sum, pixel): (&mut DVec3, usize)| {
+            let mut cast = RayCount::default();
+            for index in first..first + samples {
+                let mut stream = Stream::new(seed, frame, pixel as u64, u64::from(index));
+                let ray = camera.ray(camera.corner(pixel) + Vec2::from(stream.uniform2()));
+                let sample = radiance(world, &ray, &mut stream, options);
+                *sum += sample.radiance.as_dvec3();
+                cast.rays += u64::from(sample.rays);
+                cast.rejected += u64::from(sample.rejected);
+            }
+            cast
+        };
+        let sums = self.sums[pixels.clone()].par_iter_mut();
+        let cast: RayCount = sums.zip(pixels).map(add).sum();
+        self.rays += cast.rays;
+        self.rejected += cast.rejected;
     }
 
     /// Mean radiance of each pixel; zero before the first sample.
