@@ -109,10 +109,8 @@ pub fn seen_pixels(capture: &Capture, scene: &Scene) -> Vec<u64> {
     let mut seen = vec![0; scene.objects.len()];
     for frame in &capture.frames {
         let camera = Camera::new(&frame.intrinsics, &frame.pose, scene.origin);
-        for object in sample_pixels(scene, &camera, &[], &[], 0)
-            .into_iter()
-            .filter_map(|seen| seen.object)
-        {
+        let pixels = sample_pixels(scene, &camera, &[], &[], 0);
+        for object in pixels.iter().filter_map(|pixel| pixel.object) {
             seen[object as usize] += 1;
         }
     }
@@ -127,16 +125,15 @@ fn sample_pixels(
     emitters: &[bool],
     grid: u32,
 ) -> Vec<Seen> {
-    let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
-    let at = |x: f32, y: f32| {
-        let hit = scene.intersect(&camera.ray(Vec2::new(x, y)))?;
+    let at = |point: Vec2| {
+        let hit = scene.intersect(&camera.ray(point))?;
         Some((scene.object_of[hit.triangle as usize], hit))
     };
-    let albedo = |x: u32, y: u32| {
+    let albedo = |corner: Vec2| {
         let mut sum = Vec3::ZERO;
         for i in 0..grid * grid {
             let offset = |i: u32| (i as f32 + 0.5) / grid as f32;
-            let (object, hit) = at(x as f32 + offset(i % grid), y as f32 + offset(i / grid))?;
+            let (object, hit) = at(corner + Vec2::new(offset(i % grid), offset(i / grid)))?;
             if emitters[object as usize] {
                 return None;
             }
@@ -144,16 +141,13 @@ fn sample_pixels(
         }
         (grid > 0).then(|| sum / (grid * grid) as f32)
     };
-    (0..u64::from(width) * u64::from(height))
+    (0..camera.pixels())
         .into_par_iter()
         .map(|pixel| {
-            let (x, y) = (
-                (pixel % u64::from(width)) as u32,
-                (pixel / u64::from(width)) as u32,
-            );
+            let corner = camera.corner(pixel);
             Seen {
-                object: at(x as f32 + 0.5, y as f32 + 0.5).map(|(object, _)| object),
-                albedo: albedo(x, y),
+                object: at(corner + 0.5).map(|(object, _)| object),
+                albedo: albedo(corner),
             }
         })
         .collect()

@@ -7,10 +7,10 @@ use crate::room::Room;
 use crate::room::photographs::Rendering;
 use crate::study::experiments::box_room;
 use crate::study::experiments::course::{
-    CACHE_WITHOUT, Evaluator, Mark, cache_settings, cached, descend, paper_settings, rays_at,
+    CACHE_WITHOUT, Evaluator, cache_settings, cached, descend, paper_settings, rays_at,
 };
 use crate::study::experiments::courses::{
-    Kind, Quantity, Spread, common_mark, comparison, plot, table, words,
+    ALBEDO, Kind, Quantity, RAYS, Shown, Spread, common_mark, comparison, plot, table, words,
 };
 use crate::study::experiments::findings::{Findings, Summary};
 use crate::study::experiments::study::{Bench, Study};
@@ -39,8 +39,6 @@ const QUICK_ALBEDOS: &[(f64, &str)] = &[(0.8, "-paper-80")];
 const QUICK_DEPTHS: &[u64] = &[1, 2, 0];
 /// Where the adaptive depth is plotted.
 const CHOSEN_AT: f64 = 20.0;
-/// Half side of the lamp in metres.
-const LAMP: f64 = 0.25;
 /// An albedo error is too large if it exceeds this, ...
 const TOLERABLE: f64 = 0.01;
 /// ... and this factor times the error with adaptive depth.
@@ -72,7 +70,8 @@ fn run(bench: &Bench) -> Result<Findings> {
         Some(twin) => vec![("-paper", twin.room, twin.rendering)],
         None => (albedos.iter())
             .map(|&(albedo, file)| {
-                let room = box_room::box_room(&format!("mean albedo {albedo}"), albedo, LAMP);
+                let room =
+                    box_room::box_room(&format!("mean albedo {albedo}"), albedo, box_room::LAMP);
                 (file, room, box_room::rendering(bench.quick))
             })
             .collect(),
@@ -105,7 +104,7 @@ fn run(bench: &Bench) -> Result<Findings> {
             if let Some(scene) = scenes.last_mut() {
                 scene.cache.push((bounces, kind("transport cache", ends)));
             }
-            (bench.show)(of_albedo(&scenes));
+            (bench.show)(over_depth(&scenes, ALBEDO));
             if bounces > 0 {
                 let courses = bench.seeds().map(course).collect();
                 if let Some(scene) = scenes.last_mut() {
@@ -121,21 +120,16 @@ fn run(bench: &Bench) -> Result<Findings> {
         .map(|(_, kind)| kind.clone())
         .collect();
     let mut plots = vec![
-        ("", of_albedo(&scenes)),
+        ("", over_depth(&scenes, ALBEDO)),
         (
             "-emission",
-            over_depth(&scenes, "relative error of emission", |e| e.emission),
+            over_depth(&scenes, ("relative error of emission", |e| e.emission)),
         ),
     ];
     for scene in &scenes {
         let title = format!("Bounces of the paper's descent, {}", scene.name);
         let drawn: Vec<Kind> = scene.paper.iter().map(|(_, kind)| kind.clone()).collect();
-        let rays = |mark: &Mark| mark.rays as f64;
-        let label = "mean absolute error of albedo";
-        plots.push((
-            scene.file,
-            plot(&title, "rays", label, rays, |e| e.albedo, &drawn, &[]),
-        ));
+        plots.push((scene.file, plot(&title, RAYS, ALBEDO, &drawn, &[])));
     }
     Ok(Findings {
         how: format!(
@@ -147,7 +141,7 @@ fn run(bench: &Bench) -> Result<Findings> {
             limits.words(),
             comparison(bench.seeds),
         ),
-        tables: vec![("", table("room, solver, bounces", &kinds, &[]))],
+        tables: vec![("", table("\"room, solver, bounces\"", &kinds, &[]))],
         plots,
         summary: summary(&scenes),
         seen: seen(&scenes),
@@ -162,12 +156,8 @@ fn word(bounces: u64) -> String {
     }
 }
 
-fn of_albedo(scenes: &[TestRoom]) -> Plot {
-    over_depth(scenes, "mean absolute error of albedo", |e| e.albedo)
-}
-
 /// Error at the transport cache's end over the depth of its fit, one curve a room.
-fn over_depth(scenes: &[TestRoom], label: &str, quantity: Quantity) -> Plot {
+fn over_depth(scenes: &[TestRoom], (label, quantity): Shown) -> Plot {
     let curve = |scene: &TestRoom| {
         let mut series = Series {
             name: scene.name.clone(),
@@ -200,7 +190,7 @@ fn over_depth(scenes: &[TestRoom], label: &str, quantity: Quantity) -> Plot {
 fn at_equal_rays(scene: &TestRoom) -> (Option<u32>, Vec<(u64, Option<Spread>)>) {
     let kinds = || scene.paper.iter().map(|(_, kind)| kind);
     let mark = common_mark(kinds());
-    let error = |kind: &Kind| mark.and_then(|mark| kind.at_mark(mark, |e| e.albedo));
+    let error = |kind: &Kind| kind.at_mark(mark, |e| e.albedo);
     let errors = scene
         .paper
         .iter()
@@ -215,11 +205,7 @@ fn summary(scenes: &[TestRoom]) -> Summary {
         for (depth, kind) in &scene.cache {
             let paper = scene.paper.iter().find(|(other, _)| other == depth);
             let equal = |quantity: Quantity| {
-                words(
-                    paper
-                        .zip(mark)
-                        .and_then(|((_, k), m)| k.at_mark(m, quantity)),
-                )
+                words(paper.and_then(|(_, kind)| kind.at_mark(mark, quantity)))
             };
             rows.push(vec![
                 scene.name.clone(),
@@ -238,18 +224,9 @@ fn summary(scenes: &[TestRoom]) -> Summary {
         }
     }
     Summary {
-        columns: vec![
-            "room",
-            "bounces",
-            "cache: albedo error",
-            "emission error",
-            "loss",
-            "M rays",
-            "paper, equal rays: albedo error",
-            "emission error",
-            "loss",
-            "M rays",
-        ],
+        columns: "room | bounces | cache: albedo error | emission error | loss | M rays | \
+                  paper, equal rays: albedo error | emission error | loss | M rays"
+            .to_owned(),
         rows,
     }
 }
@@ -323,7 +300,7 @@ fn balance(scene: &TestRoom) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::experiments::course::Errors;
+    use crate::study::experiments::course::{Errors, Mark};
 
     /// A room in which the cache ends with these errors at one bounce, two bounces, and adaptive depth.
     fn room(errors: [f64; 3]) -> TestRoom {

@@ -1,7 +1,6 @@
 //! Courses of solves that studies compare: the paper's descent, measured at fixed numbers of rays, and the end of the transport
 //! cache.
 
-use crate::calibrate::problem::Problem;
 use crate::error::Result;
 use crate::inverse::estimate::{Estimate, ObjectEstimate};
 use crate::inverse::loss::LossProbe;
@@ -56,10 +55,14 @@ pub struct Errors {
 
 /// Measures estimates of a subject, always on the same pixels.
 pub struct Evaluator<'a> {
-    subject: &'a Subject,
-    probe: LossProbe,
-    watched: Option<&'a str>,
-    lobes: Vec<Option<Lobe>>,
+    /// What is solved.
+    pub subject: &'a Subject,
+    /// Measures the loss.
+    pub probe: LossProbe,
+    /// The object whose error is told by itself.
+    pub watched: Option<&'a str>,
+    /// The objects' lobes, where descents know them.
+    pub lobes: Vec<Option<Lobe>>,
 }
 
 impl<'a> Evaluator<'a> {
@@ -73,23 +76,6 @@ impl<'a> Evaluator<'a> {
             watched: None,
             lobes: Vec::new(),
         }
-    }
-
-    /// The same for descents that know the objects' lobes.
-    pub fn with_lobes(mut self, lobes: Vec<Option<Lobe>>) -> Self {
-        self.lobes = lobes;
-        self
-    }
-
-    /// The same with an object to watch.
-    pub fn watch_object(mut self, object: &'a str) -> Self {
-        self.watched = Some(object);
-        self
-    }
-
-    /// The problem to solve.
-    pub fn problem(&self) -> &'a Problem {
-        &self.subject.problem
     }
 
     /// Measures an estimate.

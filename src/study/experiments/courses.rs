@@ -31,6 +31,20 @@ pub struct Spread {
 /// Selects an error.
 pub type Quantity = fn(&Errors) -> Option<f64>;
 
+/// Label of a plot's horizontal axis, and what it shows of a mark.
+pub type Over = (&'static str, fn(&Mark) -> f64);
+/// Rays cast by the solve.
+pub const RAYS: Over = ("rays", |mark| mark.rays as f64);
+/// Seconds of solving.
+pub const SECONDS: Over = ("seconds", |mark| mark.seconds);
+
+/// Label of a plot's vertical axis, and the error that it shows.
+pub type Shown = (&'static str, Quantity);
+/// The loss on held-out pixels.
+pub const LOSS: Shown = ("held-out l1 loss, radiance", |errors| errors.loss);
+/// The error of albedo.
+pub const ALBEDO: Shown = ("mean absolute error of albedo", |errors| errors.albedo);
+
 impl Spread {
     /// Over positive values; `None` without any.
     pub fn over(values: impl Iterator<Item = f64>) -> Option<Self> {
@@ -97,16 +111,13 @@ pub fn run(
 ) -> Result<Vec<Kind>> {
     let mut kinds: Vec<Kind> = Vec::new();
     for (index, name) in names.into_iter().enumerate() {
-        let mut courses = Vec::new();
+        kinds.push(Kind {
+            name: name.clone(),
+            courses: Vec::new(),
+        });
         for seed in bench.seeds() {
             bench.begin(&format!("{name}, seed {seed}"))?;
-            courses.push(course(index, seed));
-            let kind = Kind {
-                name: name.clone(),
-                courses: courses.clone(),
-            };
-            kinds.truncate(index);
-            kinds.push(kind);
+            kinds[index].courses.push(course(index, seed));
             (bench.show)(plot(&kinds));
         }
     }
@@ -123,10 +134,11 @@ pub fn common_mark<'a>(kinds: impl IntoIterator<Item = &'a Kind>) -> Option<u32>
 }
 
 impl Kind {
-    /// An error over seeds at a mark.
-    pub fn at_mark(&self, mark: u32, quantity: Quantity) -> Option<Spread> {
+    /// An error over seeds at a mark; `None` without a mark.
+    pub fn at_mark(&self, mark: Option<u32>, quantity: Quantity) -> Option<Spread> {
+        let mark = Some(mark?);
         let values = self.courses.iter().filter_map(|course| {
-            let passed = course.iter().find(|m| m.index >= Some(mark))?;
+            let passed = course.iter().find(|m| m.index >= mark)?;
             quantity(&passed.errors)
         });
         Spread::over(values)
@@ -171,10 +183,8 @@ impl Kind {
 /// A plot of mean courses over rays or seconds, with the transport cache's ends as dots.
 pub fn plot(
     title: &str,
-    x_label: &str,
-    y_label: &str,
-    x: fn(&Mark) -> f64,
-    quantity: Quantity,
+    (x_label, x): Over,
+    (y_label, quantity): Shown,
     kinds: &[Kind],
     cache: &[Mark],
 ) -> Plot {
@@ -188,32 +198,23 @@ pub fn plot(
     series.push(Series {
         name: "transport cache, ends".to_owned(),
         points: ends,
-        band: Vec::new(),
         draw: Draw::Dots,
+        ..Series::default()
     });
     Plot {
         title: title.to_owned(),
         x: Axis::logarithmic(x_label),
         y: Axis::logarithmic(y_label),
         series,
-        marks: Vec::new(),
         labels,
+        ..Plot::default()
     }
 }
 
 /// All marks of all courses and the transport cache's ends, a row each.
-pub fn table(axis: &'static str, kinds: &[Kind], cache: &[Mark]) -> Table {
-    let mut table = Table::new(&[
-        axis,
-        "seed",
-        "mark",
-        "rays",
-        "seconds",
-        "steps",
-        "loss",
-        "albedo_error",
-        "emission_error",
-    ]);
+pub fn table(axis: &str, kinds: &[Kind], cache: &[Mark]) -> Table {
+    let columns = "seed,mark,rays,seconds,steps,loss,albedo_error,emission_error";
+    let mut table = Table::new(&format!("{axis},{columns}"));
     let mut add = |name: &str, seed: usize, mark: &Mark| {
         table.row(&[
             name.into(),

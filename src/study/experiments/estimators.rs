@@ -14,7 +14,7 @@ use crate::study::experiments::study::{Bench, Study};
 use crate::study::experiments::twin::studied;
 use crate::transport::lit::LitScene;
 use crate::transport::path::{PathOptions, radiance};
-use glam::{DVec3, Vec2};
+use glam::DVec3;
 use rayon::prelude::*;
 
 /// The study.
@@ -31,10 +31,6 @@ const SAMPLES: &[u32] = &[1, 2, 4, 8, 16, 32, 64];
 const QUICK_SAMPLES: &[u32] = &[1, 4, 16];
 /// First key of the samples, for the photographs and the fits.
 const KEY: u64 = 0x6573_7469;
-/// Mean albedo.
-const ALBEDO: f64 = 0.5;
-/// Half side of the lamp in metres.
-const LAMP: f64 = 0.25;
 /// Most pixels that are rendered; the box room's photographs have fewer.
 const MAX_PIXELS: usize = 12_000;
 /// Largest bias that counts as none.
@@ -77,17 +73,15 @@ struct EstimatorFit {
 }
 
 fn run(bench: &Bench) -> Result<Findings> {
-    let words = format!("A box room of mean albedo {ALBEDO}");
     let (size, reference, samples) = match bench.quick {
         true => ([24, 18], 256, QUICK_SAMPLES),
         false => ([48, 36], 1024, SAMPLES),
     };
-    let own_room = || {
-        let room = box_room::box_room("box room", ALBEDO, LAMP);
-        let rendering = box_room::rendering(bench.quick);
-        (room, Rendering { size, ..rendering })
+    let rendering = Rendering {
+        size,
+        ..box_room::rendering(bench.quick)
     };
-    let studied = studied(bench, &words, own_room)?;
+    let studied = studied(bench, rendering)?;
     let lit = studied.room.lit(studied.rendering.size)?;
 
     // BSDF sampling alone is noisy, like light through a door; MIS is not.
@@ -101,25 +95,11 @@ fn run(bench: &Bench) -> Result<Findings> {
         });
     bench.begin("photographs")?;
     let photographs = render(&lit, &options[1].1, [KEY, 0], reference);
-    let mut table = Table::new(&[
-        "sampling",
-        "estimator",
-        "samples",
-        "seed",
-        "scale",
-        "predicted",
-    ]);
+    let mut table = Table::new("sampling,estimator,samples,seed,scale,predicted");
     let mut plots = Vec::new();
+    let [a, b, c, d] = ESTIMATORS.map(|(name, _)| name);
     let mut summary = Summary {
-        columns: vec![
-            "sampling",
-            "samples a pixel",
-            ESTIMATORS[0].0,
-            ESTIMATORS[1].0,
-            ESTIMATORS[2].0,
-            "l2 same, predicted",
-            ESTIMATORS[3].0,
-        ],
+        columns: format!("sampling | samples a pixel | {a} | {b} | {c} | l2 same, predicted | {d}"),
         rows: Vec::new(),
     };
     let mut seen = Vec::new();
@@ -209,14 +189,12 @@ fn render(lit: &LitScene, options: &PathOptions, [seed, set]: [u64; 2], samples:
         .map(|index| {
             let (frame, pixel) = pixels[index * pixels.len() / count];
             let camera = &scene.cameras[frame];
-            let width = camera.intrinsics.width as usize;
-            let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
+            // Through the pixel's centre, so that only the light is noisy.
+            let ray = camera.ray(camera.corner(pixel) + 0.5);
             let mut sum = DVec3::ZERO;
             for sample in 0..samples {
                 let key = (set << 32) + u64::from(sample);
                 let mut stream = Stream::new(seed, frame as u64, pixel as u64, key);
-                // Through the pixel's centre, so that only the light is noisy.
-                let ray = camera.ray(corner + 0.5);
                 sum += radiance(lit, &ray, &mut stream, options)
                     .radiance
                     .as_dvec3();
@@ -302,11 +280,10 @@ fn plot(
         });
     }
     let predicted = samples.iter().zip(predictions);
-    series.push(Series {
-        name: "l2, same samples: predicted".to_owned(),
-        points: predicted.map(|(&n, &p)| [f64::from(n), p]).collect(),
-        ..Series::default()
-    });
+    series.push(Series::line(
+        "l2, same samples: predicted",
+        predicted.map(|(&n, &p)| [f64::from(n), p]),
+    ));
     Plot {
         title: format!("Fitted brightness of a lamp, paths by {name}"),
         x: Axis::logarithmic("samples a pixel"),

@@ -10,12 +10,12 @@ use crate::room::photographs::{Rendering, STORED, render, stored};
 use crate::room::shape::Modeller;
 use crate::scene::visibility::NOTHING;
 use crate::study::experiments::chair::chair;
-use crate::study::experiments::standing::{Cylinder, places, up};
+use crate::study::experiments::standing::{Cylinder, places, up, upright};
 use crate::study::experiments::subject::Subject;
 use crate::study::experiments::twin::Studied;
 use crate::transport::lit::LitScene;
 use crate::transport::material::{Albedo, Material};
-use glam::{DAffine3, DQuat, DVec3, Vec3};
+use glam::{DAffine3, DVec3, Vec3};
 use std::cmp::Reverse;
 use std::sync::Arc;
 
@@ -130,12 +130,11 @@ pub fn of_twin(twin: Studied) -> Result<Furnished> {
             "run the study on rooms of its own",
         )
     })?;
-    let up = up.as_dvec3().normalize_or(DVec3::Y);
-    let upright = DAffine3::from_quat(DQuat::from_rotation_arc(DVec3::Y, up));
+    let upwards = up.as_dvec3().normalize_or(DVec3::Y);
     let stand = |index: usize| {
-        let at = places[index].as_dvec3() + scene.origin + up * (LIFT * height);
+        let at = places[index].as_dvec3() + scene.origin + upwards * (LIFT * height);
         DAffine3::from_translation(at)
-            * upright
+            * upright(up)
             * DAffine3::from_rotation_y(CHAIRS[index].3)
             * DAffine3::from_scale(DVec3::splat(height / HEIGHT))
     };
@@ -251,6 +250,7 @@ fn append(mesh: &mut Mesh, other: Mesh) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::geometry::Ray;
 
     #[test]
     fn chairs_stand_free_in_the_room_and_are_seen() {
@@ -268,13 +268,8 @@ mod tests {
             }
             let corners = scene.corners(triangle as u32);
             for i in 0..3 {
-                let (from, to) = (corners[i], corners[(i + 1) % 3]);
-                let direction = to - from;
-                let ray = crate::scene::geometry::Ray {
-                    t_max: direction.length(),
-                    ..crate::scene::geometry::Ray::new(from, direction.normalize_or_zero())
-                };
-                let hit = room.lit.scene.intersect(&ray);
+                let hit =
+                    (room.lit.scene).intersect(&Ray::between(corners[i], corners[(i + 1) % 3]));
                 assert!(hit.is_none(), "{object} {hit:?}");
             }
         }

@@ -34,6 +34,8 @@ mod twin;
 
 pub use chair::chair;
 pub use findings::{Findings, Grid, Summary};
+pub(super) use insertion::insert;
+pub(super) use standing::upright;
 pub use standing::{Cylinder, places, up};
 pub use study::{Bench, Limits, Study};
 pub use subject::Subject;

@@ -265,7 +265,7 @@ impl Measure {
 }
 
 fn findings(how: String, states: Vec<State>, truth: Option<Vec<Picture>>) -> Findings {
-    let mut table = Table::new(&["state", "unknowns", "psnr", "loss", "seconds", "rays"]);
+    let mut table = Table::new("state,unknowns,psnr,loss,seconds,rays");
     let mut rows = Vec::new();
     let number = |value: Option<f64>, unit: &str| {
         value.map_or("-".to_owned(), |value| format!("{}{unit}", brief(value)))
@@ -301,14 +301,8 @@ fn findings(how: String, states: Vec<State>, truth: Option<Vec<Picture>>) -> Fin
         tables: vec![("", table)],
         plots: vec![("", plot)],
         summary: Summary {
-            columns: vec![
-                "state",
-                "unknowns",
-                "albedo pictures, PSNR",
-                "held-out loss",
-                "seconds",
-                "M rays",
-            ],
+            columns: "state | unknowns | albedo pictures, PSNR | held-out loss | seconds | M rays"
+                .to_owned(),
             rows,
         },
         seen,
@@ -319,12 +313,9 @@ fn findings(how: String, states: Vec<State>, truth: Option<Vec<Picture>>) -> Fin
 /// Accuracy of the albedo pictures over rays, by PSNR if the truth is `known`, else by loss.
 fn plot(states: &[State], known: bool) -> Plot {
     let point = |state: &State| Some([state.rays as f64, state.psnr.or(state.loss)?]);
-    let series = |name: &str, solver: &str| Series {
-        name: name.to_owned(),
-        points: (states.iter().filter(|s| s.name.starts_with(solver)))
-            .filter_map(point)
-            .collect(),
-        ..Series::default()
+    let series = |name: &str, solver: &str| {
+        let states = states.iter().filter(|s| s.name.starts_with(solver));
+        Series::line(name, states.filter_map(point))
     };
     Plot {
         title: "Textures".to_owned(),

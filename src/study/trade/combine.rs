@@ -83,28 +83,10 @@ fn at(curves: &[&Curve], seconds: f64) -> Point {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inverse::settings::Settings;
+    use crate::inverse::settings::Preset;
 
     fn curve(points: &[[f64; 2]]) -> Curve {
-        Curve {
-            name: "balanced".into(),
-            is_preset: true,
-            settings: Settings::default(),
-            ended: None,
-            rejected: 1,
-            points: points
-                .iter()
-                .map(|&[seconds, error]| Point {
-                    seconds,
-                    error,
-                    spread: None,
-                    reported: Some(error),
-                    rays: 10,
-                    iterations: 2,
-                    pareto: false,
-                })
-                .collect(),
-        }
+        Curve::through(Preset::Balanced, points)
     }
 
     #[test]

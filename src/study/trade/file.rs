@@ -14,21 +14,7 @@ const JSON: &str = "trade.json";
 const MAX_BYTES: u64 = 1 << 28;
 
 /// Columns of trade.csv; the last three are constant.
-const COLUMNS: [&str; 13] = [
-    "curve",
-    "preset",
-    "seconds",
-    "error",
-    "error_low",
-    "error_high",
-    "reported_error",
-    "rays",
-    "iterations",
-    "pareto",
-    "measure",
-    "threads",
-    "cpu",
-];
+const COLUMNS: &str = "curve,preset,seconds,error,error_low,error_high,reported_error,rays,iterations,pareto,measure,threads,cpu";
 
 impl Trade {
     /// Writes trade.json, trade.csv and trade.png into a folder.
@@ -67,7 +53,7 @@ impl Trade {
 
     /// The table, one row for each point.
     pub fn table(&self) -> Table {
-        let mut table = Table::new(&COLUMNS);
+        let mut table = Table::new(COLUMNS);
         for curve in &self.curves {
             for point in &curve.points {
                 table.row(&self.row(curve, point));
