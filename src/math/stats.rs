@@ -14,6 +14,15 @@ pub struct Moments {
     pub sum_squares: f64,
 }
 
+impl FromIterator<f64> for Moments {
+    fn from_iter<I: IntoIterator<Item = f64>>(samples: I) -> Self {
+        samples.into_iter().fold(Self::default(), |mut all, x| {
+            all.push(x);
+            all
+        })
+    }
+}
+
 impl Moments {
     /// Adds one sample.
     pub fn push(&mut self, x: f64) {
@@ -109,12 +118,9 @@ mod tests {
     #[test]
     fn merged_moments_equal_those_of_all_samples() {
         let xs: Vec<f64> = (0..100).map(|i| ((i * 37) % 101) as f64 + 1e6).collect();
-        let mut all = Moments::default();
-        xs.iter().for_each(|&x| all.push(x));
-        let (mut a, mut b) = (Moments::default(), Moments::default());
-        xs[..33].iter().for_each(|&x| a.push(x));
-        xs[33..].iter().for_each(|&x| b.push(x));
-        a.merge(&b);
+        let of = |xs: &[f64]| xs.iter().copied().collect::<Moments>();
+        let (all, mut a) = (of(&xs), of(&xs[..33]));
+        a.merge(&of(&xs[33..]));
         assert_eq!(a.count, all.count);
         assert!((a.mean - all.mean).abs() < 1e-9);
         assert!((a.variance() - all.variance()).abs() < 1e-6);

@@ -75,7 +75,6 @@ fn run(bench: &Bench) -> Result<Findings> {
 
     let draw = |over| drawn(over, (&kinds, batches), &cache);
     let mark = common_mark(&kinds);
-    let common = mark.map_or(0.0, |mark| rays_when(&kinds, mark));
     Ok(Findings {
         how: format!(
             "The paper's descent on {}, {} seeds each, ADAM as published with nothing annealed and albedos and emissions \
@@ -92,7 +91,7 @@ fn run(bench: &Bench) -> Result<Findings> {
         tables: vec![("", table("batch", &kinds, &cache))],
         plots: vec![("", draw(RAYS)), ("-seconds", draw(SECONDS))],
         summary: summary(&kinds, mark),
-        seen: seen(&kinds, batches, &cache, mark, common, &limits.words()),
+        seen: seen(&kinds, batches, &cache, mark, &limits.words()),
         ..Findings::default()
     })
 }
@@ -146,10 +145,10 @@ fn seen(
     batches: &[(u64, u64)],
     cache: &[Mark],
     mark: Option<u32>,
-    common: f64,
     limit: &str,
 ) -> Vec<String> {
     let mut seen = Vec::new();
+    let common = mark.map_or(0.0, |mark| rays_when(kinds, mark));
     let rays = format!("At equal rays ({:.2} million)", common * 1e-6);
     let at_rays: Vec<Option<Spread>> = (kinds.iter())
         .map(|kind| kind.at_mark(mark, |e| e.loss))

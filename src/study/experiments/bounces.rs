@@ -14,8 +14,8 @@ use crate::study::experiments::courses::{
 };
 use crate::study::experiments::findings::{Findings, Summary};
 use crate::study::experiments::study::{Bench, Study};
-use crate::study::experiments::subject::Subject;
 use crate::study::experiments::twin::{Sizes, twin};
+use crate::study::subject::Subject;
 
 /// The study.
 pub const STUDY: Study = Study {
@@ -54,6 +54,13 @@ struct TestRoom {
     cache: Vec<(u64, Kind)>,
     /// By depth: courses of the descent.
     paper: Vec<(u64, Kind)>,
+}
+
+impl TestRoom {
+    /// The last mark that all courses of the descent passed.
+    fn common_mark(&self) -> Option<u32> {
+        common_mark(self.paper.iter().map(|(_, kind)| kind))
+    }
 }
 
 fn run(bench: &Bench) -> Result<Findings> {
@@ -186,22 +193,10 @@ fn over_depth(scenes: &[TestRoom], (label, quantity): Shown) -> Plot {
     }
 }
 
-/// Albedo errors of the descent by depth at the last mark that all courses passed, and that mark.
-fn at_equal_rays(scene: &TestRoom) -> (Option<u32>, Vec<(u64, Option<Spread>)>) {
-    let kinds = || scene.paper.iter().map(|(_, kind)| kind);
-    let mark = common_mark(kinds());
-    let error = |kind: &Kind| kind.at_mark(mark, |e| e.albedo);
-    let errors = scene
-        .paper
-        .iter()
-        .map(|(depth, kind)| (*depth, error(kind)));
-    (mark, errors.collect())
-}
-
 fn summary(scenes: &[TestRoom]) -> Summary {
     let mut rows = Vec::new();
     for scene in scenes {
-        let mark = at_equal_rays(scene).0;
+        let mark = scene.common_mark();
         for (depth, kind) in &scene.cache {
             let paper = scene.paper.iter().find(|(other, _)| other == depth);
             let equal = |quantity: Quantity| {
@@ -270,9 +265,9 @@ fn seen(scenes: &[TestRoom]) -> Vec<String> {
 
 /// Which depth is best for the descent, and which others do not differ beyond the noise.
 fn balance(scene: &TestRoom) -> Option<String> {
-    let (mark, errors) = at_equal_rays(scene);
-    let known: Vec<(u64, Spread)> = (errors.into_iter())
-        .filter_map(|(depth, error)| Some((depth, error?)))
+    let mark = scene.common_mark();
+    let known: Vec<(u64, Spread)> = (scene.paper.iter())
+        .filter_map(|(depth, kind)| Some((*depth, kind.at_mark(mark, |e| e.albedo)?)))
         .collect();
     let (best, lowest) = *known.iter().min_by(|a, b| a.1.mean.total_cmp(&b.1.mean))?;
     let (_, two) = known.iter().find(|(depth, _)| *depth == 2)?;

@@ -7,7 +7,7 @@ use crate::room::cameras::View;
 use crate::room::photographs::Rendering;
 use crate::room::shape::Modeller;
 use crate::scene::geometry::Hit;
-use crate::study::experiments::subject::Subject;
+use crate::study::subject::Subject;
 use crate::transport::material::{Lobe, Material};
 use glam::{DVec3, Vec3};
 
@@ -132,9 +132,6 @@ pub fn truth(room: &Room) -> Unknowns {
 }
 
 /// The [`standard`] room with photographs of all bounces, rendered as by [`rendering`].
-///
-/// # Errors
-/// Never for this room.
 pub fn photographed(quick: bool) -> Result<Subject> {
     Subject::of_room(&standard(), &rendering(quick))
 }

@@ -8,7 +8,7 @@ use crate::inverse::paper::descent::{Descent, StepOutcome};
 use crate::inverse::settings::{Preset, Settings};
 use crate::inverse::solver::Solution;
 use crate::study::experiments::study::{Bench, Limits};
-use crate::study::experiments::subject::Subject;
+use crate::study::subject::Subject;
 use crate::study::trade::plan::Run;
 use crate::study::trade::watch;
 use crate::transport::material::Lobe;

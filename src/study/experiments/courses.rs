@@ -48,10 +48,8 @@ pub const ALBEDO: Shown = ("mean absolute error of albedo", |errors| errors.albe
 impl Spread {
     /// Over positive values; `None` without any.
     pub fn over(values: impl Iterator<Item = f64>) -> Option<Self> {
-        let mut moments = Moments::default();
-        values
-            .filter(|value| value.is_finite() && *value > 0.0)
-            .for_each(|value| moments.push(value.ln()));
+        let known = values.filter(|value| value.is_finite() && *value > 0.0);
+        let moments: Moments = known.map(f64::ln).collect();
         (moments.count > 0).then(|| Self {
             mean: moments.mean.exp(),
             factor: moments.variance().sqrt().exp(),
@@ -164,14 +162,12 @@ impl Kind {
             ..Series::default()
         };
         for index in 0..=last.unwrap_or(0) {
-            let here = || {
-                let at =
-                    |course: &'_ Vec<Mark>| course.iter().find(|m| m.index == Some(index)).cloned();
-                self.courses.iter().filter_map(at)
-            };
-            if let Some(spread) = Spread::over(here().filter_map(|mark| quantity(&mark.errors))) {
-                let places = here().map(|mark| x(&mark));
-                let place = places.sum::<f64>() / here().count().max(1) as f64;
+            let here: Vec<&Mark> = (self.courses.iter())
+                .filter_map(|course| course.iter().find(|m| m.index == Some(index)))
+                .collect();
+            let errors = here.iter().filter_map(|mark| quantity(&mark.errors));
+            if let Some(spread) = Spread::over(errors) {
+                let place = here.iter().map(|mark| x(mark)).sum::<f64>() / here.len() as f64;
                 series.points.push([place, spread.mean]);
                 series.band.push(spread.band());
             }

@@ -60,8 +60,7 @@ pub fn noise(
             of_pixel(problem, &tracer, unknowns, frame, pixel, paths)
         })
         .collect();
-    let mut variance = Moments::default();
-    found.iter().for_each(|(value, _)| variance.push(*value));
+    let variance: Moments = found.iter().map(|(value, _)| *value).collect();
     let rays: u64 = found.iter().map(|(_, rays)| rays).sum();
     Noise {
         variance: variance.mean,

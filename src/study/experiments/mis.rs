@@ -15,8 +15,8 @@ use crate::study::experiments::courses::{
 use crate::study::experiments::findings::{Findings, Summary, brief};
 use crate::study::experiments::gradient::{Noise, noise};
 use crate::study::experiments::study::{Bench, Study};
-use crate::study::experiments::subject::Subject;
 use crate::study::experiments::twin::{Sizes, twin};
+use crate::study::subject::Subject;
 use crate::transport::material::Lobe;
 use glam::Vec3;
 

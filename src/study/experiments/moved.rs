@@ -78,12 +78,8 @@ pub fn hit_error(room: &Room, scene: &Scene, met: &[bool], size: f64) -> f64 {
             let corners = room.mesh.triangles[hit.triangle as usize];
             let [a, b, c] = corners.map(|i| room.mesh.positions[i as usize]);
             let normal = (b - a).cross(c - a);
-            let direction = pose.rotation
-                * DVec3::new(
-                    (f64::from(at.x) - lens.cx) / lens.fx,
-                    (lens.cy - f64::from(at.y)) / lens.fy,
-                    -1.0,
-                );
+            let on_plane = lens.normalized(at.as_dvec2());
+            let direction = pose.rotation * DVec3::new(on_plane.x, -on_plane.y, -1.0);
             let t = (a - pose.center).dot(normal) / direction.dot(normal);
             let found = scene.point(&hit).as_dvec3() + scene.origin;
             errors.push((pose.center + direction * t - found).length() / size);

@@ -9,9 +9,9 @@ use crate::study::experiments::course::{cache_settings, solved};
 use crate::study::experiments::findings::{Findings, Summary, brief};
 use crate::study::experiments::moved::{self, hit_error};
 use crate::study::experiments::study::{Bench, Study};
-use crate::study::experiments::subject::Subject;
 use crate::study::experiments::summed::Paths;
 use crate::study::experiments::twin::studied;
+use crate::study::subject::Subject;
 use glam::Vec3;
 
 /// The study.

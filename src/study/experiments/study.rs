@@ -4,8 +4,8 @@ use crate::error::{Error, Result};
 use crate::export::atomic::write_bytes;
 use crate::export::plot::Plot;
 use crate::study::experiments::findings::Findings;
-use crate::study::experiments::subject::Subject;
 use crate::study::machine::Machine;
+use crate::study::subject::Subject;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 

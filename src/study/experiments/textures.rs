@@ -15,7 +15,7 @@ use crate::study::experiments::course::{cache_settings, paper_settings, solved};
 use crate::study::experiments::findings::{Findings, Grid, Summary, brief};
 use crate::study::experiments::furnished::built_in;
 use crate::study::experiments::study::{Bench, Study};
-use crate::study::experiments::subject::Subject;
+use crate::study::subject::Subject;
 use crate::transport::lit::LitScene;
 use glam::Vec3;
 use std::sync::Arc;

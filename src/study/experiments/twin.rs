@@ -14,7 +14,7 @@ use crate::scene::camera::Camera;
 use crate::study::experiments::box_room;
 use crate::study::experiments::course::{cache_settings, solved};
 use crate::study::experiments::study::Bench;
-use crate::study::experiments::subject::Subject;
+use crate::study::subject::Subject;
 use crate::transport::material::Material;
 use glam::Vec3;
 
