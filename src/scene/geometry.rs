@@ -31,10 +31,8 @@ impl Ray {
     #[inline]
     pub fn between(from: Vec3, to: Vec3) -> Self {
         Self {
-            origin: from,
-            direction: to - from,
-            t_min: 0.0,
             t_max: 1.0,
+            ..Self::new(from, to - from)
         }
     }
 }

@@ -66,13 +66,10 @@ impl Scene {
     /// The mesh has no triangle with an area.
     pub fn new(capture: &Capture) -> Result<Self> {
         let mesh = &capture.mesh;
+        let refused = |problem| Err(Error::new(&capture.name, problem, "check the mesh file"));
         let (low, high) = mesh.bounds();
         if mesh.triangles.is_empty() || !(high - low).is_finite() {
-            return Err(Error::new(
-                &capture.name,
-                "the mesh has no triangles",
-                "check the mesh file",
-            ));
+            return refused("the mesh has no triangles");
         }
         let origin = (low + high) * 0.5;
         let positions: Vec<Vec3> = mesh
@@ -103,11 +100,7 @@ impl Scene {
             objects[object as usize].area += cross.length() * 0.5;
         }
         if objects.iter().all(|o| o.area == 0.0) {
-            return Err(Error::new(
-                &capture.name,
-                "every triangle of the mesh has zero area",
-                "check the mesh file",
-            ));
+            return refused("every triangle of the mesh has zero area");
         }
 
         let cameras = capture

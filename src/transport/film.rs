@@ -52,26 +52,12 @@ impl Film {
         samples: u32,
     ) {
         let rows = 0..self.height;
-        self.trace(world, camera, options, (seed, frame), rows, samples);
-        self.samples += samples;
+        self.add_rows(world, camera, options, (seed, frame), rows, samples);
     }
 
-    /// Adds one path to each pixel of some rows, keyed as in [`Film::add`]. The call with the last row increments the number of
+    /// Adds `samples` paths to each pixel of some rows, keyed as in [`Film::add`]. The call with the last row increases the number of
     /// samples; until then [`Film::mean`] is invalid.
     pub fn add_rows(
-        &mut self,
-        world: &impl World,
-        camera: &Camera,
-        options: &PathOptions,
-        key: (u64, u64),
-        rows: Range<u32>,
-    ) {
-        let last = rows.end >= self.height;
-        self.trace(world, camera, options, key, rows, 1);
-        self.samples += u32::from(last);
-    }
-
-    fn trace(
         &mut self,
         world: &impl World,
         camera: &Camera,
@@ -80,6 +66,7 @@ impl Film {
         rows: Range<u32>,
         samples: u32,
     ) {
+        let is_last = rows.end >= self.height;
         let first = self.samples;
         let width = self.width as usize;
         let pixels = rows.start as usize * width..rows.end.min(self.height) as usize * width;
@@ -99,6 +86,7 @@ impl Film {
         let cast: RayCount = sums.zip(pixels).map(add).sum();
         self.rays += cast.rays;
         self.rejected += cast.rejected;
+        self.samples += if is_last { samples } else { 0 };
     }
 
     /// Mean radiance of each pixel; zero before the first sample.
