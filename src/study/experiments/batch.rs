@@ -12,6 +12,7 @@ use crate::study::experiments::courses::{
 };
 use crate::study::experiments::findings::{Findings, Summary};
 use crate::study::experiments::study::{Bench, Study};
+use std::borrow::Cow;
 
 /// The study.
 pub const STUDY: Study = Study {
@@ -41,19 +42,15 @@ const PAPER: (u64, u64) = (8, 1);
 const WORSE: f64 = 1.05;
 
 fn run(bench: &Bench) -> Result<Findings> {
-    let made;
     let subject = match bench.subject {
-        Some(subject) => subject,
-        None => {
-            made = box_room::photographed(bench.quick)?;
-            &made
-        }
+        Some(subject) => Cow::Borrowed(subject),
+        None => Cow::Owned(box_room::photographed(bench.quick)?),
     };
     let batches = if bench.quick { QUICK } else { BATCHES };
     let limits = bench.limits(batches.len() * bench.seeds as usize);
 
     // The descents; the transport cache's end is measured below.
-    let gauge = Evaluator::new(subject, paper_settings(1).max_bounces());
+    let gauge = Evaluator::new(&subject, paper_settings(1).max_bounces());
     let course = |index: usize, seed| {
         let (batch, samples) = batches[index];
         let settings = Settings {
@@ -68,7 +65,7 @@ fn run(bench: &Bench) -> Result<Findings> {
     let kinds = courses::run(bench, names, course, so_far)?;
     // The cache fits all bounces, so its estimate is rendered with all.
     bench.begin("transport cache")?;
-    let gauge = Evaluator::new(subject, u32::MAX);
+    let gauge = Evaluator::new(&subject, u32::MAX);
     let cache: Vec<Mark> = (bench.seeds())
         .map(|seed| cached(bench, &gauge, &cache_settings(seed, bench.quick)))
         .collect::<Result<_>>()?;
@@ -134,8 +131,7 @@ fn summary(kinds: &[Kind], mark: Option<u32>) -> Summary {
     };
     Summary {
         columns: "batch | loss at equal rays | albedo error at equal rays | loss at the end | albedo error at the end | \
-                  M rays at the end | steps"
-            .to_owned(),
+                  M rays at the end | steps",
         rows: kinds.iter().map(row).collect(),
     }
 }

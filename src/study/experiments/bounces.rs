@@ -85,7 +85,7 @@ fn run(bench: &Bench) -> Result<Findings> {
     };
     let limits = bench.limits(2 * rooms.len() * depths.len() * bench.seeds as usize);
     let mut scenes: Vec<TestRoom> = Vec::new();
-    for (file, room, rendering) in &rooms {
+    for (index, (file, room, rendering)) in rooms.iter().enumerate() {
         let subject = Subject::of_room(room, rendering)?;
         // The loss is measured with all bounces, whatever the fit has.
         let gauge = Evaluator::new(&subject, u32::MAX);
@@ -108,15 +108,12 @@ fn run(bench: &Bench) -> Result<Findings> {
                 courses,
             };
             let ends = bench.seeds().map(end).collect::<Result<_>>()?;
-            if let Some(scene) = scenes.last_mut() {
-                scene.cache.push((bounces, kind("transport cache", ends)));
-            }
+            let cache = (bounces, kind("transport cache", ends));
+            scenes[index].cache.push(cache);
             (bench.show)(over_depth(&scenes, ALBEDO));
             if bounces > 0 {
                 let courses = bench.seeds().map(course).collect();
-                if let Some(scene) = scenes.last_mut() {
-                    scene.paper.push((bounces, kind("paper", courses)));
-                }
+                scenes[index].paper.push((bounces, kind("paper", courses)));
             }
         }
     }
@@ -220,8 +217,7 @@ fn summary(scenes: &[TestRoom]) -> Summary {
     }
     Summary {
         columns: "room | bounces | cache: albedo error | emission error | loss | M rays | \
-                  paper, equal rays: albedo error | emission error | loss | M rays"
-            .to_owned(),
+                  paper, equal rays: albedo error | emission error | loss | M rays",
         rows,
     }
 }

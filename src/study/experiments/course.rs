@@ -87,10 +87,8 @@ impl<'a> Evaluator<'a> {
             albedo: known.as_ref().and_then(|known| known.albedo_mae),
             object: known.as_ref().and_then(|known| {
                 let mut objects = known.per_object.iter();
-                objects
-                    .find(|(name, _)| Some(name.as_str()) == self.watched)?
-                    .1
-                    .albedo_rel
+                let watched = objects.find(|(name, _)| Some(name.as_str()) == self.watched);
+                watched?.1.albedo_rel
             }),
             emission: known.and_then(|known| known.emission_rel_median),
         }

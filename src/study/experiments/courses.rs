@@ -192,10 +192,8 @@ pub fn plot(
     // A ring without a label; the legend names it.
     let labels = ends.iter().map(|&end| (end, String::new())).collect();
     series.push(Series {
-        name: "transport cache, ends".to_owned(),
-        points: ends,
         draw: Draw::Dots,
-        ..Series::default()
+        ..Series::line("transport cache, ends", ends)
     });
     Plot {
         title: title.to_owned(),

@@ -106,32 +106,31 @@ fn run(bench: &Bench) -> Result<Findings> {
     let studied = studied(bench, rendering)?;
     let lit = studied.room.lit(studied.rendering.size)?;
 
-    // BSDF sampling alone is noisy, like light through a door; MIS is not.
-    let options =
-        [("BSDF sampling", false), ("both (MIS)", true)].map(|(name, sample_emitters)| {
-            let options = PathOptions {
-                sample_emitters,
-                ..PathOptions::default()
-            };
-            (name, options)
-        });
+    let options = |sample_emitters| PathOptions {
+        sample_emitters,
+        ..PathOptions::default()
+    };
     bench.begin("photographs")?;
-    let photographs = render(&lit, &options[1].1, [KEY, 0], reference);
+    let photographs = render(&lit, &options(true), [KEY, 0], reference);
     let mut table = Table::new("sampling,estimator,samples,seed,scale,predicted");
     let mut plots = Vec::new();
-    let [a, b, c, d] = ESTIMATORS.map(|(name, _)| name);
     let mut summary = Summary {
-        columns: format!("sampling | samples a pixel | {a} | {b} | {c} | l2 same, predicted | {d}"),
+        columns: "sampling | samples a pixel | l1, same samples | l1, independent samples | l2, same samples | \
+                  l2 same, predicted | l2, two sets",
         rows: Vec::new(),
     };
     let mut seen = Vec::new();
-    for ((name, options), suffix) in options.iter().zip(["", "-mis"]) {
+    // BSDF sampling alone is noisy, like light through a door; MIS is not.
+    for (name, suffix, options) in [
+        ("BSDF sampling", "", options(false)),
+        ("both (MIS)", "-mis", options(true)),
+    ] {
         let mut fits: Vec<Fits> = Vec::new();
         for &count in samples {
             bench.begin(&format!("{name}, {count} samples a pixel"))?;
             let (mut scales, mut predicted) = (Vec::new(), Moments::default());
             for seed in bench.seeds() {
-                let sets = [1, 2].map(|set| render(&lit, options, [KEY + seed, set], count));
+                let sets = [1, 2].map(|set| render(&lit, &options, [KEY + seed, set], count));
                 let pixels = pixels(&photographs, &sets);
                 predicted.push(same_samples_predicted(&pixels));
                 scales.push(ESTIMATORS.map(|(_, fit)| fit(&pixels)));
@@ -147,7 +146,7 @@ fn run(bench: &Bench) -> Result<Findings> {
             for (seed, scales) in (1u64..).zip(&at.scales) {
                 for (index, (estimator, _)) in ESTIMATORS.iter().enumerate() {
                     table.row(&[
-                        (*name).into(),
+                        name.into(),
                         (*estimator).into(),
                         u64::from(at.samples).into(),
                         seed.into(),
@@ -158,7 +157,7 @@ fn run(bench: &Bench) -> Result<Findings> {
             }
             let [a, b, c, d] = [0, 1, 2, 3].map(|estimator| at.value(estimator));
             let predicted = format!("{:.4}", at.predicted);
-            let name = (*name).to_owned();
+            let name = name.to_owned();
             (summary.rows).push(vec![name, at.samples.to_string(), a, b, c, predicted, d]);
         }
         plots.push((suffix, plot(name, &fits)));

@@ -65,7 +65,7 @@ impl Grid {
 #[derive(Debug, Clone, Default)]
 pub struct Summary {
     /// Column titles, with ` | ` between them.
-    pub columns: String,
+    pub columns: &'static str,
     /// Rows, one text for each column.
     pub rows: Vec<Vec<String>>,
 }
@@ -76,7 +76,7 @@ impl Summary {
         let line = |cells: &str| format!("| {cells} |\n");
         let rule = vec!["---"; self.columns.split(" | ").count()];
         let rows: String = self.rows.iter().map(|row| line(&row.join(" | "))).collect();
-        line(&self.columns) + &line(&rule.join(" | ")) + &rows
+        line(self.columns) + &line(&rule.join(" | ")) + &rows
     }
 }
 

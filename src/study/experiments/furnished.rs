@@ -1,6 +1,5 @@
 //! A room with and without two chairs: the built-in room, or the twin of a capture.
 
-use crate::capture::mesh::Mesh;
 use crate::capture::photograph::Photograph;
 use crate::compose::object::ObjectModel;
 use crate::compose::placement::Placement;
@@ -183,17 +182,27 @@ fn furnish(
     let size = photographs.first().map_or([0; 2], |p| [p.width, p.height]);
     let subject = Subject::of_photographs(&room, photographs)?;
     let lit = room.lit(size)?;
-    let chairs = chairs(stands);
-    let material = |color: [f32; 3]| Material::diffuse(color.into(), Vec3::ZERO);
-    let models = (CHAIRS.iter().enumerate())
-        .map(|(index, (name, color, ..))| {
-            let corners = corners_of(&chairs, index as u32);
-            ObjectModel::from_corners(name, corners, material(*color)).map(Arc::new)
-        })
-        .collect::<Result<_>>()?;
-    let colors = CHAIRS.iter().map(|(_, color, ..)| material(*color));
-    room.materials.extend(colors);
-    append(&mut room.mesh, chairs);
+    let is_textured = !room.mesh.corner_uvs.is_empty();
+    let mut modeller = Modeller {
+        mesh: room.mesh,
+        ..Modeller::default()
+    };
+    let mut models = Vec::new();
+    for ((name, color, ..), stand) in CHAIRS.into_iter().zip(stands) {
+        let first = modeller.mesh.triangles.len();
+        modeller.object(name);
+        modeller.placed(stand, chair);
+        let corners = modeller.mesh.triangles[first..].iter();
+        let corners = corners.map(|corners| corners.map(|i| modeller.mesh.positions[i as usize]));
+        let material = Material::diffuse(color.into(), Vec3::ZERO);
+        room.materials.push(material.clone());
+        let model = ObjectModel::from_corners(name, corners.collect(), material)?;
+        models.push(Arc::new(model));
+    }
+    room.mesh = modeller.mesh;
+    if !is_textured {
+        room.mesh.corner_uvs.clear();
+    }
     Ok(Furnished {
         name: room.name.clone(),
         how: String::new(),
@@ -212,38 +221,6 @@ fn flatten(material: &mut Material) {
         let sum: Vec3 = texture.pixels.iter().sum();
         let mean = sum / texture.pixels.len().max(1) as f32 * *tint;
         material.albedo = Albedo::Constant(mean);
-    }
-}
-
-fn chairs(stands: [DAffine3; 2]) -> Mesh {
-    let mut modeller = Modeller::default();
-    for ((name, ..), stand) in CHAIRS.into_iter().zip(stands) {
-        modeller.object(name);
-        modeller.placed(stand, chair);
-    }
-    modeller.mesh
-}
-
-fn corners_of(mesh: &Mesh, object: u32) -> Vec<[DVec3; 3]> {
-    let triangles = mesh.triangles.iter().zip(&mesh.object_of);
-    triangles
-        .filter(|(_, of)| **of == object)
-        .map(|(corners, _)| corners.map(|i| mesh.positions[i as usize]))
-        .collect()
-}
-
-/// Appends the objects of a mesh to another.
-fn append(mesh: &mut Mesh, other: Mesh) {
-    let (corners, objects) = (mesh.positions.len() as u32, mesh.objects.len() as u32);
-    mesh.positions.extend(other.positions);
-    mesh.objects.extend(other.objects);
-    let triangles = other.triangles.into_iter();
-    mesh.triangles
-        .extend(triangles.map(|t| t.map(|i| i + corners)));
-    let object_of = other.object_of.into_iter();
-    mesh.object_of.extend(object_of.map(|k| k + objects));
-    if !mesh.corner_uvs.is_empty() {
-        mesh.corner_uvs.extend(other.corner_uvs);
     }
 }
 

@@ -296,8 +296,7 @@ fn summary(scenes: &[Scene]) -> Summary {
         })
     });
     Summary {
-        columns: "room | way | objects: relative error · PSNR · SSIM | shadow and bleed: the same"
-            .to_owned(),
+        columns: "room | way | objects: relative error · PSNR · SSIM | shadow and bleed: the same",
         rows: rows.collect(),
     }
 }

@@ -53,10 +53,11 @@ const ROOMS: [Lamp; 3] = [
         }),
     },
 ];
-const SAMPLINGS: [LightSampling; 3] = [
-    LightSampling::Mis,
-    LightSampling::Emitter,
-    LightSampling::Bsdf,
+/// The samplings that are compared, in words too.
+const SAMPLINGS: [(LightSampling, &str); 3] = [
+    (LightSampling::Mis, "both (MIS)"),
+    (LightSampling::Emitter, "light sampling"),
+    (LightSampling::Bsdf, "BSDF sampling"),
 ];
 /// Means within this factor of each other count as equal.
 const AS_GOOD: f64 = 1.05;
@@ -135,18 +136,17 @@ fn run(bench: &Bench) -> Result<Findings> {
         let all_bounces = Evaluator::new(&subject, u32::MAX);
         let course = |index: usize, seed| {
             let settings = Settings {
-                light_sampling: SAMPLINGS[index],
+                light_sampling: SAMPLINGS[index].0,
                 ..paper_settings(seed)
             };
             descend(bench, &gauge, &settings, limits)
         };
-        let names = SAMPLINGS.map(|sampling| format!("{name}, {}", word(sampling)));
+        let names = SAMPLINGS.map(|(_, word)| format!("{name}, {word}"));
         let so_far = |kinds: &[Kind]| plot(name, RAYS, LOSS, kinds, &[]);
         let kinds = courses::run(bench, names, course, so_far)?;
         bench.begin(&format!("{name}, variance of gradients"))?;
-        let measure = |sampling: &LightSampling| {
-            noise(&subject.problem, &truth, &lobes, *sampling, pixels, paths)
-        };
+        let measure =
+            |(sampling, _)| noise(&subject.problem, &truth, &lobes, sampling, pixels, paths);
         let cache = |seed| Settings {
             lobes: lobes.iter().any(Option::is_some),
             ..cache_settings(seed, bench.quick)
@@ -155,7 +155,7 @@ fn run(bench: &Bench) -> Result<Findings> {
             name: name.to_owned(),
             files: *files,
             kinds,
-            noises: SAMPLINGS.iter().map(measure).collect(),
+            noises: SAMPLINGS.map(measure).to_vec(),
             cache: (bench.seeds())
                 .map(|seed| cached(bench, &all_bounces, &cache(seed)))
                 .collect::<Result<_>>()?,
@@ -196,18 +196,10 @@ fn run(bench: &Bench) -> Result<Findings> {
     })
 }
 
-fn word(sampling: LightSampling) -> &'static str {
-    match sampling {
-        LightSampling::Mis => "both (MIS)",
-        LightSampling::Emitter => "light sampling",
-        LightSampling::Bsdf => "BSDF sampling",
-    }
-}
-
 fn variances(scenes: &[LitRoom]) -> Table {
     let mut table = Table::new("scene,sampling,variance,standard_error,rays_per_path");
     for scene in scenes {
-        for (sampling, noise) in SAMPLINGS.iter().zip(&scene.noises) {
+        for ((sampling, _), noise) in SAMPLINGS.iter().zip(&scene.noises) {
             table.row(&[
                 scene.name.as_str().into(),
                 sampling.word().into(),
@@ -245,10 +237,8 @@ fn summary(scenes: &[LitRoom]) -> Summary {
         }
     }
     Summary {
-        columns:
-            "scene, sampling | loss at equal rays | albedo error at equal rays | loss at the end | \
-                  gradient variance a path | rays a path | variance × rays"
-                .to_owned(),
+        columns: "scene, sampling | loss at equal rays | albedo error at equal rays | loss at the end | \
+                  gradient variance a path | rays a path | variance × rays",
         rows,
     }
 }

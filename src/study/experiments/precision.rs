@@ -191,7 +191,7 @@ fn findings(words: &str, noise: f64, lines: &[Line]) -> Findings {
         tables: vec![("", table)],
         plots: vec![("", plot(lines))],
         summary: Summary {
-            columns: "axis | quantity | least error | largest error | tolerable | reach".to_owned(),
+            columns: "axis | quantity | least error | largest error | tolerable | reach",
             rows: lines.iter().map(row).collect(),
         },
         seen: (lines.iter())

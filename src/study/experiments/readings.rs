@@ -113,7 +113,7 @@ pub fn mistakes() -> Vec<Mistake> {
 fn run(bench: &Bench) -> Result<Findings> {
     let mut table = Table::new("room,mistake,agreement,refused,right");
     let mut summary = Summary {
-        columns: "mistake | rooms | refused | with the right remedy".to_owned(),
+        columns: "mistake | rooms | refused | with the right remedy",
         rows: Vec::new(),
     };
     let mut row = |capture: &Capture, name: &str, outcome: &Outcome| {

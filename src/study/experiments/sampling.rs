@@ -184,8 +184,7 @@ fn summary(kinds: &[Kind], evenness: &[Evenness]) -> Summary {
         ]
     }));
     Summary {
-        columns: "what | loss at equal rays | albedo error at equal rays | loss at the end | albedo error at the end"
-            .to_owned(),
+        columns: "what | loss at equal rays | albedo error at equal rays | loss at the end | albedo error at the end",
         rows,
     }
 }

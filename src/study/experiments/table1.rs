@@ -107,8 +107,7 @@ fn run(bench: &Bench) -> Result<Findings> {
         plots: vec![("", plot(&all))],
         summary: Summary {
             columns: "object | solver | relative error of albedo in %, root mean square | each seed | \
-                      floor in % (noise of the photographs) | the paper's | lamp's error in % | seconds | M rays"
-                .to_owned(),
+                      floor in % (noise of the photographs) | the paper's | lamp's error in % | seconds | M rays",
             rows: (all.iter())
                 .flat_map(|s| s.by_solver().map(|(solver, marks)| row(s, solver, marks)))
                 .collect(),

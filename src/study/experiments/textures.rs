@@ -56,19 +56,18 @@ struct Measure {
 }
 
 fn run(bench: &Bench) -> Result<Findings> {
-    let room = match bench.subject {
-        Some(_) => None,
-        None => Some(built_in(true, bench.quick)?),
+    let room;
+    let (subject, truth) = match bench.subject {
+        Some(subject) => (subject, None),
+        None => {
+            room = built_in(true, bench.quick)?;
+            (&room.subject, Some(&room.lit))
+        }
     };
-    let subject = match (&room, bench.subject) {
-        (Some(room), _) => &room.subject,
-        (None, Some(subject)) => subject,
-        (None, None) => return Ok(Findings::default()),
-    };
-    let measure = Measure::new(subject, room.as_ref().map(|room| &room.lit));
+    let measure = Measure::new(subject, truth);
 
     // The transport cache, with one colour an object and with textures.
-    let own_light = room.is_some();
+    let own_light = truth.is_some();
     let of_objects = Settings {
         exposures: !own_light,
         outside_light: !own_light,
@@ -301,8 +300,7 @@ fn findings(how: String, states: Vec<State>, truth: Option<Vec<Picture>>) -> Fin
         tables: vec![("", table)],
         plots: vec![("", plot)],
         summary: Summary {
-            columns: "state | unknowns | albedo pictures, PSNR | held-out loss | seconds | M rays"
-                .to_owned(),
+            columns: "state | unknowns | albedo pictures, PSNR | held-out loss | seconds | M rays",
             rows,
         },
         seen,

@@ -78,11 +78,7 @@ pub fn composite(family: Family, seed: u64, plan: &Plan) -> Result<Option<Compos
     let Some(chair) = standing(&truth)? else {
         return Ok(None);
     };
-    let true_chair = [Arc::new(PlacedObject::new(
-        chair.clone(),
-        &Placement::new("chair", None),
-        &truth.scene,
-    )?)];
+    let true_chair = [placed(&chair, &truth.scene)?];
     let frames = most_seen(&truth, &true_chair);
     let scores = (frames.iter())
         .map(|&frame| scores(&solved, frame, &truth, &true_chair, &chair))
@@ -212,6 +208,11 @@ fn standing(truth: &LitScene) -> Result<Option<Arc<ObjectModel>>> {
     ObjectModel::from_corners("chair", corners, material).map(|model| Some(Arc::new(model)))
 }
 
+/// The chair where it is modelled.
+fn placed(chair: &Arc<ObjectModel>, scene: &Scene) -> Result<Arc<PlacedObject>> {
+    PlacedObject::new(chair.clone(), &Placement::new("chair", None), scene).map(Arc::new)
+}
+
 /// The photographs that see most of the chair, without those that it nearly fills.
 fn most_seen(truth: &Arc<LitScene>, chair: &[Arc<PlacedObject>]) -> Vec<usize> {
     let world = FurnishedScene::new(truth, chair);
@@ -312,11 +313,7 @@ fn scores(
 
     // The composites.
     let scene = &problem.scene;
-    let placed = [Arc::new(PlacedObject::new(
-        chair.clone(),
-        &Placement::new("chair", None),
-        scene,
-    )?)];
+    let placed = [placed(chair, scene)?];
     let lit = Arc::new(estimate.lit(scene));
     let plain = backdrop(scene, estimate.exposure(frame))?;
     let (ours, _) = insert(&lit, &plain, &placed, full, [1, 3], SAMPLES[0]);
