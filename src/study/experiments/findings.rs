@@ -37,15 +37,6 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// An empty grid.
-    pub fn new(columns: usize) -> Self {
-        Self {
-            columns,
-            exposure: 1.0,
-            pictures: Vec::new(),
-        }
-    }
-
     /// Writes the grid as a PNG.
     ///
     /// # Errors

@@ -146,7 +146,11 @@ fn scene(
         name: room.name.clone(),
         file,
         likeness: [[Likeness::default(); 2]; 5],
-        grid: Grid::new(WAYS.len() - 1),
+        grid: Grid {
+            columns: WAYS.len() - 1,
+            exposure: 1.0,
+            pictures: Vec::new(),
+        },
     };
     for &frame in &room.frames {
         let camera = &scene.cameras[frame];

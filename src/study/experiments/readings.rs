@@ -130,21 +130,20 @@ fn run(bench: &Bench) -> Result<Findings> {
     let subject = bench.subject.map(|subject| (*subject.capture).clone());
     let mut captures = vec![in_memory(&subject.map_or_else(room::capture, Ok)?)?];
     let first = decide(&captures[0], None)?;
-    let mut sound = Sound::default();
-    sound.count(&first);
     row(&captures[0], "none", &first);
+    let mut sound = vec![first];
     let families = match bench.subject {
         Some(_) => &[],
         None => &Family::ALL[..],
     };
     for family in families {
         for seed in bench.seeds() {
-            let so_far = format!("{} of {} refused so far", sound.refused, sound.all);
+            let so_far = format!("{} of {} refused so far", refused(&sound), sound.len());
             bench.begin(&format!("{} room {seed}, sound; {so_far}", family.name()))?;
             let capture = in_memory(&family.generate(seed, rooms::SIZE)?.capture)?;
             let outcome = decide(&capture, None)?;
-            sound.count(&outcome);
             row(&capture, "none", &outcome);
+            sound.push(outcome);
             if *family == Family::Plain && captures.len() < MAX_CAPTURES {
                 captures.push(capture);
             }
@@ -190,29 +189,23 @@ fn run(bench: &Bench) -> Result<Findings> {
             format!(
                 "Of {} sound captures {} were refused, and of {} it was said that it cannot be told. {} of their photographs were said \
                 to have another's pose.",
-                sound.all, sound.refused, sound.doubtful, sound.mispaired
+                sound.len(),
+                refused(&sound),
+                (sound.iter())
+                    .filter(|outcome| outcome.alignment.decision == Decision::Doubtful)
+                    .count(),
+                (sound.iter())
+                    .map(|outcome| outcome.alignment.mispaired.len())
+                    .sum::<usize>(),
             ),
         ],
         ..Findings::default()
     })
 }
 
-/// What was said of sound captures.
-#[derive(Debug, Default)]
-struct Sound {
-    all: u64,
-    refused: u64,
-    doubtful: u64,
-    mispaired: usize,
-}
-
-impl Sound {
-    fn count(&mut self, outcome: &Outcome) {
-        self.all += 1;
-        self.refused += u64::from(outcome.detected);
-        self.doubtful += u64::from(outcome.alignment.decision == Decision::Doubtful);
-        self.mispaired += outcome.alignment.mispaired.len();
-    }
+/// Number of captures that were refused.
+fn refused(outcomes: &[Outcome]) -> usize {
+    outcomes.iter().filter(|outcome| outcome.detected).count()
 }
 
 /// The capture with its photographs in memory, so that files are read only once.

@@ -289,12 +289,14 @@ fn findings(how: String, states: Vec<State>, truth: Option<Vec<Picture>>) -> Fin
     }
     let plot = plot(&states, truth.is_some());
     let seen = seen(&states);
-    let mut grid = Grid::new(3);
     let shown = truth.and_then(|pictures| pictures.into_iter().nth(SHOWN));
-    grid.pictures
-        .extend(shown.map(|picture| ("truth".to_owned(), picture)));
+    let shown = shown.map(|picture| ("truth".to_owned(), picture));
     let pictures = states.into_iter().map(|state| (state.name, state.picture));
-    grid.pictures.extend(pictures);
+    let grid = Grid {
+        columns: 3,
+        exposure: 1.0,
+        pictures: shown.into_iter().chain(pictures).collect(),
+    };
     Findings {
         how,
         tables: vec![("", table)],

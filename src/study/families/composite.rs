@@ -85,11 +85,11 @@ pub fn composite(family: Family, seed: u64, plan: &Plan) -> Result<Option<Compos
         .collect::<Result<Vec<_>>>()?;
     let count = scores.len() as f64;
     let mean = |score: fn(&Scores) -> f64| scores.iter().map(score).sum::<f64>() / count;
-    let changed: Vec<AroundScores> = scores.iter().filter_map(|s| s.around).collect();
-    let around = |score: fn(&AroundScores) -> f64, weight: fn(&AroundScores) -> f64| {
-        let sum = |of: fn(&AroundScores) -> f64| changed.iter().map(of).sum::<f64>();
-        (!changed.is_empty()).then(|| sum(score) / sum(weight))
-    };
+    let changed: Vec<[f64; 4]> = scores.iter().filter_map(|s| s.around).collect();
+    let [shadow, untouched, product, square] =
+        [0, 1, 2, 3].map(|score| changed.iter().map(|around| around[score]).sum::<f64>());
+    let frames = changed.len() as f64;
+    let around = |mean: f64| (!changed.is_empty()).then_some(mean);
     Ok((!scores.is_empty()).then(|| CompositeRow {
         family,
         seed,
@@ -97,9 +97,9 @@ pub fn composite(family: Family, seed: u64, plan: &Plan) -> Result<Option<Compos
         chair: mean(|s| s.chair),
         naive: mean(|s| s.naive),
         brightness: mean(|s| s.brightness),
-        shadow: around(|b| b.shadow, |_| 1.0),
-        untouched: around(|b| b.untouched, |_| 1.0),
-        slope: around(|b| b.slope[0], |b| b.slope[1]),
+        shadow: around(shadow / frames),
+        untouched: around(untouched / frames),
+        slope: around(product / square),
     }))
 }
 
@@ -237,17 +237,9 @@ struct Scores {
     chair: f64,
     naive: f64,
     brightness: f64,
-    /// Scores beside the chair, if it changes any pixel there.
-    around: Option<AroundScores>,
-}
-
-/// Scores over the shadow and bleed.
-#[derive(Debug, Clone, Copy)]
-struct AroundScores {
-    shadow: f64,
-    untouched: f64,
-    /// Sums of the composite's change times the true change, and of the squared true change.
-    slope: [f64; 2],
+    /// If the chair changes any pixel beside it: PSNR of the composite over these and of the photograph without the chair, and sums
+    /// of the composite's change times the true change and of the squared true change.
+    around: Option<[f64; 4]>,
 }
 
 /// The exposure and vignetting that bring a render of the empty room nearest to its photograph, by least squares over valid pixels.
@@ -348,23 +340,20 @@ fn scores(
         indices.iter().map(|&i| f64::from(value(i))).sum()
     };
     let ours_at = |i: usize| ours.pixels[i];
-    let slope = || {
-        let ours = |i: usize| (ours_at(i) - pixels[i]).dot(change_at(i));
-        [
-            sum(&ours, &around),
-            sum(&|i| change_at(i).length_squared(), &around),
-        ]
-    };
+    let product = |i: usize| (ours_at(i) - pixels[i]).dot(change_at(i));
     let bright =
         |picture: &dyn Fn(usize) -> Vec3| sum(&|i| shown(picture(i)).element_sum(), &covered);
     Ok(Scores {
         chair: psnr(&covered, &ours_at, &truth_at),
         naive: psnr(&covered, &|i| naive.pixels[i], &truth_at),
         brightness: bright(&ours_at) / bright(&truth_at),
-        around: (!around.is_empty()).then(|| AroundScores {
-            shadow: psnr(&around, &ours_at, &true_at),
-            untouched: psnr(&around, &|i| pixels[i], &true_at),
-            slope: slope(),
+        around: (!around.is_empty()).then(|| {
+            [
+                psnr(&around, &ours_at, &true_at),
+                psnr(&around, &|i| pixels[i], &true_at),
+                sum(&product, &around),
+                sum(&|i| change_at(i).length_squared(), &around),
+            ]
         }),
     })
 }
