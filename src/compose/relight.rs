@@ -122,7 +122,7 @@ impl Relighting {
             let key = (self.seed.wrapping_add(part as u64), self.backdrop.frame);
             for (film, lit) in self.pairs[part].iter_mut().zip(&self.lights) {
                 let camera = &self.camera;
-                film.add_rows(&**lit, camera, &self.options, key, rows.clone());
+                film.add_rows(&**lit, camera, &self.options, key, rows.clone(), 1);
             }
             self.next_row = rows.end % height.max(1);
         }

@@ -22,8 +22,7 @@ pub fn table(scene: &Scene, estimate: &Estimate) -> Table {
         "note",
     ];
     columns.extend(rest.map(str::to_owned));
-    let names: Vec<&str> = columns.iter().map(String::as_str).collect();
-    let mut table = Table::new(&names);
+    let mut table = Table::new(&columns.join(","));
 
     let unknown = ObjectEstimate::default();
     for (index, object) in scene.objects.iter().enumerate() {

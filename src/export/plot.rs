@@ -197,6 +197,17 @@ impl Plot {
     }
 }
 
+impl Series {
+    /// A curve of straight lines between points.
+    pub fn line(name: impl Into<String>, points: impl IntoIterator<Item = [f64; 2]>) -> Self {
+        Self {
+            name: name.into(),
+            points: points.into_iter().collect(),
+            ..Self::default()
+        }
+    }
+}
+
 impl Axis {
     /// A linear axis.
     pub fn linear(label: &str) -> Self {
@@ -232,10 +243,9 @@ fn steps(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
 /// Loss of a solve over seconds, in the fit and on held-out pixels, and the relative residual of the fit after each
 /// iteration, with the stages marked.
 pub fn loss_plot(losses: &[LossPoint], fits: &[FitPoint], stages: &[Stage]) -> Plot {
-    let curve = |name: &str, value: fn(&LossPoint) -> Option<f64>| Series {
-        name: name.to_owned(),
-        points: (losses.iter().filter_map(|p| Some([p.seconds, value(p)?]))).collect(),
-        ..Series::default()
+    let curve = |name: &str, value: fn(&LossPoint) -> Option<f64>| {
+        let points = losses.iter();
+        Series::line(name, points.filter_map(|p| Some([p.seconds, value(p)?])))
     };
     let mut start = 0.0;
     let mark = |stage: &Stage| {
@@ -245,11 +255,10 @@ pub fn loss_plot(losses: &[LossPoint], fits: &[FitPoint], stages: &[Stage]) -> P
     let series = [
         curve("in the fit", |p| p.train),
         curve("held out", |p| p.held_out),
-        Series {
-            name: "residual, relative".to_owned(),
-            points: fits.iter().map(|p| [p.seconds, p.residual]).collect(),
-            ..Series::default()
-        },
+        Series::line(
+            "residual, relative",
+            fits.iter().map(|p| [p.seconds, p.residual]),
+        ),
     ];
     Plot {
         title: "Loss".to_owned(),
@@ -300,10 +309,7 @@ mod tests {
         let image = draw(&Plot {
             x: Axis::logarithmic("samples"),
             y: Axis::logarithmic("error"),
-            series: vec![Series {
-                points,
-                ..Default::default()
-            }],
+            series: vec![Series::line("", points)],
             ..Default::default()
         });
         let [a, b, c] = [200, 400, 600].map(|x| height_of(&image, COLORS[0], x..x + 20));

@@ -3,6 +3,7 @@
 pub mod blur;
 pub mod cholesky;
 pub mod color;
+pub mod cumulative;
 pub mod frame;
 pub mod nullable;
 pub mod picture;

@@ -82,6 +82,7 @@ impl Stream {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::stats::chi_square;
 
     #[test]
     fn the_same_key_gives_the_same_stream_and_another_key_another() {
@@ -101,20 +102,12 @@ mod tests {
     #[test]
     fn neighbouring_keys_are_jointly_uniform() {
         let mut cells = [0u32; 64];
-        let n = 64_000;
-        for pixel in 0..n {
+        for pixel in 0..64_000 {
             let a = Stream::new(7, 0, pixel, 0).uniform();
             let b = Stream::new(7, 0, pixel + 1, 0).uniform();
             cells[(a * 8.0) as usize * 8 + (b * 8.0) as usize] += 1;
         }
-        let expected = n as f64 / 64.0;
-        let chi2: f64 = cells
-            .iter()
-            .map(|&c| (f64::from(c) - expected).powi(2) / expected)
-            .sum();
-        assert!(
-            chi2 < 113.5,
-            "chi-square of 63 degrees of freedom was {chi2}"
-        );
+        let chi2 = chi_square(&cells);
+        assert!(chi2 < 113.5, "{chi2}");
     }
 }

@@ -84,6 +84,7 @@ impl Uniforms for SequencePoint {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::stats::chi_square;
 
     /// A smooth function of the first eight numbers of a path, with mean one.
     fn smooth(numbers: &mut impl Uniforms) -> f64 {
@@ -113,9 +114,8 @@ mod tests {
     /// significance 1e-4 together (1e-4/48 each, 15 degrees of freedom).
     #[test]
     fn each_point_alone_is_uniform_in_every_dimension() {
-        let keys = 8_000;
         let mut cells = vec![[0u32; 16]; 48];
-        for key in 0..keys {
+        for key in 0..8_000 {
             let mut point = SequencePoint::new(5, [key, 1, 2], 3);
             for group in 0..12 {
                 for (d, x) in point.four().into_iter().enumerate() {
@@ -123,11 +123,8 @@ mod tests {
                 }
             }
         }
-        let expected = keys as f64 / 16.0;
         for (dimension, cells) in cells.iter().enumerate() {
-            let chi2: f64 = (cells.iter())
-                .map(|&c| (f64::from(c) - expected).powi(2) / expected)
-                .sum();
+            let chi2 = chi_square(cells);
             assert!(chi2 < 51.5, "{dimension}: {chi2}");
         }
     }
@@ -163,10 +160,7 @@ mod tests {
                 let added = (point.refine(coarse) - f64::from(coarse)) / spacing;
                 cells[(added * 16.0) as usize] += 1;
             }
-            let expected = 4_000.0 / 16.0;
-            let chi2: f64 = (cells.iter())
-                .map(|&c| (f64::from(c) - expected).powi(2) / expected)
-                .sum();
+            let chi2 = chi_square(&cells);
             assert!(chi2 < 46.2, "{groups}: {chi2}");
         }
     }

@@ -14,6 +14,15 @@ pub struct Moments {
     pub sum_squares: f64,
 }
 
+impl FromIterator<f64> for Moments {
+    fn from_iter<I: IntoIterator<Item = f64>>(samples: I) -> Self {
+        samples.into_iter().fold(Self::default(), |mut all, x| {
+            all.push(x);
+            all
+        })
+    }
+}
+
 impl Moments {
     /// Adds one sample.
     pub fn push(&mut self, x: f64) {
@@ -94,6 +103,14 @@ pub fn upper_median(values: &mut [f32]) -> Option<f32> {
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
 
+/// Pearson's chi-square of counts in cells of equal probability.
+#[cfg(test)]
+pub(super) fn chi_square(cells: &[u32]) -> f64 {
+    let expected = f64::from(cells.iter().sum::<u32>()) / cells.len() as f64;
+    let squares = cells.iter().map(|&n| (f64::from(n) - expected).powi(2));
+    squares.sum::<f64>() / expected
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -101,12 +118,9 @@ mod tests {
     #[test]
     fn merged_moments_equal_those_of_all_samples() {
         let xs: Vec<f64> = (0..100).map(|i| ((i * 37) % 101) as f64 + 1e6).collect();
-        let mut all = Moments::default();
-        xs.iter().for_each(|&x| all.push(x));
-        let (mut a, mut b) = (Moments::default(), Moments::default());
-        xs[..33].iter().for_each(|&x| a.push(x));
-        xs[33..].iter().for_each(|&x| b.push(x));
-        a.merge(&b);
+        let of = |xs: &[f64]| xs.iter().copied().collect::<Moments>();
+        let (all, mut a) = (of(&xs), of(&xs[..33]));
+        a.merge(&of(&xs[33..]));
         assert_eq!(a.count, all.count);
         assert!((a.mean - all.mean).abs() < 1e-9);
         assert!((a.variance() - all.variance()).abs() < 1e-6);

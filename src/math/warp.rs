@@ -62,20 +62,16 @@ pub fn uniform_triangle(u: [f32; 2]) -> [f32; 2] {
 mod tests {
     use super::*;
     use crate::math::rng::Stream;
+    use crate::math::stats;
 
     /// Chi-square with equal-probability cells; critical value of 63 degrees of freedom at 1e-4.
     fn chi_square(cell_of: impl Fn([f32; 2]) -> usize) -> f64 {
         let mut stream = Stream::new(11, 0, 0, 0);
-        let n = 128_000;
         let mut cells = [0u32; 64];
-        for _ in 0..n {
+        for _ in 0..128_000 {
             cells[cell_of(stream.uniform2()).min(63)] += 1;
         }
-        let expected = f64::from(n) / 64.0;
-        cells
-            .iter()
-            .map(|&c| (f64::from(c) - expected).powi(2) / expected)
-            .sum()
+        stats::chi_square(&cells)
     }
 
     fn azimuth_cell(x: f32, y: f32) -> usize {

@@ -1,5 +1,6 @@
 //! The ground truth of the room, in the format that `relit evaluate` reads.
 
+use crate::math::cumulative::Cumulative;
 use crate::math::frame::Frame;
 use crate::math::picture::Picture;
 use crate::math::rng::Stream;
@@ -149,27 +150,27 @@ fn mean_over_area(
 ) -> Vec3 {
     let scene = &world.scene;
     let triangles = &scene.objects[object].triangles;
-    let mut total = 0.0;
-    let mut up_to = |&triangle: &u32| {
-        total += f64::from(scene.areas[triangle as usize]);
-        total
-    };
-    let cumulative_areas: Vec<f64> = triangles.iter().map(&mut up_to).collect();
-    let sample = |index: u64| {
-        let mut stream = Stream::new(0, object as u64, 0, index);
-        // Strata of equal area.
-        let area = (index as f64 + stream.uniform_f64()) / SAMPLES as f64 * total;
-        let chosen = cumulative_areas.partition_point(|&sum| sum <= area);
-        let [b1, b2] = uniform_triangle(stream.uniform2());
-        let hit = Hit {
-            t: 0.0,
-            triangle: triangles[chosen.min(triangles.len() - 1)],
-            b1,
-            b2,
-        };
-        quantity(&hit, &mut stream)
-    };
-    let values: Vec<Vec3> = (0..SAMPLES).into_par_iter().map(sample).collect();
+    let area = |&triangle: &u32| f64::from(scene.areas[triangle as usize]);
+    let areas = Cumulative::new(triangles.iter().map(area));
+    let values: Vec<Vec3> = (0..SAMPLES)
+        .into_par_iter()
+        .map(|index| {
+            let mut stream = Stream::new(0, object as u64, 0, index);
+            // Strata of equal area.
+            let area = (index as f64 + stream.uniform_f64()) / SAMPLES as f64 * areas.total();
+            let Some(chosen) = areas.index_at(area) else {
+                return Vec3::ZERO;
+            };
+            let [b1, b2] = uniform_triangle(stream.uniform2());
+            let hit = Hit {
+                triangle: triangles[chosen],
+                b1,
+                b2,
+                ..Hit::default()
+            };
+            quantity(&hit, &mut stream)
+        })
+        .collect();
     let sum: DVec3 = values.iter().map(|v| v.as_dvec3()).sum();
     (sum / SAMPLES as f64).as_vec3()
 }

@@ -25,6 +25,18 @@ impl Camera {
         }
     }
 
+    /// Number of pixels.
+    pub fn pixels(&self) -> usize {
+        self.intrinsics.width as usize * self.intrinsics.height as usize
+    }
+
+    /// The top-left corner of a pixel; pixels are counted row by row.
+    #[inline]
+    pub fn corner(&self, pixel: usize) -> Vec2 {
+        let width = self.intrinsics.width as usize;
+        Vec2::new((pixel % width) as f32, (pixel / width) as f32)
+    }
+
     /// The ray through a point of the image plane in pixels from the top-left corner; its direction has unit length.
     #[inline]
     pub fn ray(&self, pixel: Vec2) -> Ray {

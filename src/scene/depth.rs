@@ -11,6 +11,7 @@ use crate::scene::visibility::NOTHING;
 use glam::Vec2;
 use image::{ImageBuffer, Luma};
 use rayon::prelude::*;
+use std::path::Path;
 use std::sync::Arc;
 
 /// A pixel contradicts the mesh if the difference exceeds [`MEDIANS`] × the frame's median difference + [`DEPTH_FRACTION`] × depth.
@@ -27,38 +28,25 @@ pub fn compare(
     scene: &Scene,
     photographs: &[Arc<Photograph>],
 ) -> (Vec<Arc<Photograph>>, Vec<String>) {
-    let frames: Vec<(Arc<Photograph>, Option<Result<u64>>)> = (0..photographs.len())
+    let outcomes: Vec<Option<Result<(Photograph, u64)>>> = (0..photographs.len())
         .into_par_iter()
         .map(|frame| {
-            let photograph = &photographs[frame];
-            let Some((path, unit)) = &capture.frames[frame].depth else {
-                return (photograph.clone(), None);
-            };
-            let depth = match decode(path) {
-                Ok(image) => Depth { image, unit: *unit },
-                Err(error) => return (photograph.clone(), Some(Err(error))),
-            };
-            if !depth.matches_aspect_of(photograph) {
-                let error = Error::file(
-                    path,
-                    "has another aspect ratio than its photograph",
-                    "its pixels are not compared",
-                );
-                return (photograph.clone(), Some(Err(error)));
-            }
-            let (masked, count) = mask(&depth, scene, frame, photograph);
-            (Arc::new(masked), Some(Ok(count)))
+            let (path, unit) = capture.frames[frame].depth.as_ref()?;
+            Some(mask(path, *unit, scene, frame, &photographs[frame]))
         })
         .collect();
+    let read = outcomes.iter().flatten().count();
 
     let mut warnings = Vec::new();
     let (mut contradicting, mut compared) = (0, 0);
     let mut refused = Vec::new();
-    for (photograph, outcome) in &frames {
+    let mut photographs = photographs.to_vec();
+    for (photograph, outcome) in photographs.iter_mut().zip(outcomes) {
         match outcome {
-            Some(Ok(count)) => {
+            Some(Ok((masked, count))) => {
                 contradicting += count;
-                compared += photograph.pixels.len() as u64;
+                compared += masked.pixels.len() as u64;
+                *photograph = Arc::new(masked);
             }
             Some(Err(error)) => refused.push(error),
             None => {}
@@ -66,9 +54,8 @@ pub fn compare(
     }
     if let Some(first) = refused.first() {
         warnings.push(format!(
-            "{} of {} depth images are not compared with the mesh: {first}",
+            "{} of {read} depth images are not compared with the mesh: {first}",
             refused.len(),
-            frames.iter().filter(|f| f.1.is_some()).count()
         ));
     }
     if contradicting > 0 {
@@ -77,7 +64,7 @@ pub fn compare(
             contradicting as f64 / compared as f64 * 100.0
         ));
     }
-    (frames.into_iter().map(|f| f.0).collect(), warnings)
+    (photographs, warnings)
 }
 
 /// A depth image of the same view as a photograph.
@@ -106,15 +93,29 @@ impl Depth {
     }
 }
 
-/// Marks the pixels that contradict the mesh as unusable; also returns their number.
-fn mask(depth: &Depth, scene: &Scene, frame: usize, photograph: &Photograph) -> (Photograph, u64) {
+/// Marks the pixels that contradict the mesh by a depth image as unusable; also returns their number.
+fn mask(
+    path: &Path,
+    unit: f64,
+    scene: &Scene,
+    frame: usize,
+    photograph: &Photograph,
+) -> Result<(Photograph, u64)> {
+    let image = decode(path)?;
+    let depth = Depth { image, unit };
+    if !depth.matches_aspect_of(photograph) {
+        return Err(Error::file(
+            path,
+            "has another aspect ratio than its photograph",
+            "its pixels are not compared",
+        ));
+    }
     let size = [photograph.width, photograph.height];
     let camera = &scene.cameras[frame];
     let triangles = &scene.ids().triangles[frame];
     let pixels: Vec<Option<(f64, f64)>> = (triangles.iter().enumerate())
         .map(|(pixel, &triangle)| {
-            let place = [pixel as u32 % size[0], pixel as u32 / size[0]];
-            let at = Vec2::from(place.map(|x| x as f32 + 0.5));
+            let at = camera.corner(pixel) + 0.5;
             let measured = depth.at(at / Vec2::new(size[0] as f32, size[1] as f32))?;
             Some((measured, mesh_depth(scene, camera, at, triangle)))
         })
@@ -135,7 +136,7 @@ fn mask(depth: &Depth, scene: &Scene, frame: usize, photograph: &Photograph) -> 
         count += u64::from(contradicts);
         *usable &= !contradicts;
     }
-    (masked, count)
+    Ok((masked, count))
 }
 
 /// Depth in metres along the optical axis of a triangle's plane; infinite for [`NOTHING`].

@@ -31,16 +31,14 @@ impl Ray {
     #[inline]
     pub fn between(from: Vec3, to: Vec3) -> Self {
         Self {
-            origin: from,
-            direction: to - from,
-            t_min: 0.0,
             t_max: 1.0,
+            ..Self::new(from, to - from)
         }
     }
 }
 
 /// Where a ray met a triangle.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Hit {
     /// Distance along the ray in units of its direction.
     pub t: f32,

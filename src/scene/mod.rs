@@ -4,7 +4,6 @@ pub mod bvh;
 pub mod camera;
 pub mod depth;
 pub mod geometry;
-pub mod ids;
 pub mod prepare;
 pub mod texels;
 pub mod visibility;
@@ -16,8 +15,8 @@ use bvh::Bvh;
 use camera::Camera;
 use geometry::{Hit, Ray};
 use glam::{DVec3, Vec3};
-use ids::IdBuffers;
 use std::sync::OnceLock;
+use visibility::IdBuffers;
 
 /// Geometry and cameras of a capture, in metres relative to [`Scene::origin`].
 #[derive(Debug)]
@@ -67,13 +66,10 @@ impl Scene {
     /// The mesh has no triangle with an area.
     pub fn new(capture: &Capture) -> Result<Self> {
         let mesh = &capture.mesh;
+        let refused = |problem| Err(Error::new(&capture.name, problem, "check the mesh file"));
         let (low, high) = mesh.bounds();
         if mesh.triangles.is_empty() || !(high - low).is_finite() {
-            return Err(Error::new(
-                &capture.name,
-                "the mesh has no triangles",
-                "check the mesh file",
-            ));
+            return refused("the mesh has no triangles");
         }
         let origin = (low + high) * 0.5;
         let positions: Vec<Vec3> = mesh
@@ -104,11 +100,7 @@ impl Scene {
             objects[object as usize].area += cross.length() * 0.5;
         }
         if objects.iter().all(|o| o.area == 0.0) {
-            return Err(Error::new(
-                &capture.name,
-                "every triangle of the mesh has zero area",
-                "check the mesh file",
-            ));
+            return refused("every triangle of the mesh has zero area");
         }
 
         let cameras = capture

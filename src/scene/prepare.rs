@@ -99,30 +99,23 @@ impl Prepared {
 /// Warnings about objects that no photograph sees, and about photographs that do not see the mesh.
 fn unseen(scene: &Scene) -> Vec<String> {
     let ids = scene.ids();
-    let mut warnings = Vec::new();
-    let objects: Vec<&str> = (0..scene.objects.len())
-        .filter(|&object| ids.seen_pixels(object) == 0)
-        .map(|object| scene.objects[object].name.as_str())
+    let objects: Vec<&str> = (scene.objects.iter().enumerate())
+        .filter(|(index, _)| ids.seen_pixels(*index) == 0)
+        .map(|(_, object)| object.name.as_str())
         .collect();
-    if !objects.is_empty() {
-        warnings.push(format!(
-            "no photograph sees {}: {}",
-            count(objects.len(), "object"),
-            listed(&objects)
-        ));
-    }
     let photographs: Vec<String> = (0..scene.cameras.len())
         .filter(|&frame| ids.pixels_on_mesh(frame) == 0)
         .map(|frame| format!("{frame:03}"))
         .collect();
-    if !photographs.is_empty() {
-        warnings.push(format!(
-            "{} see nothing of the mesh: {}",
-            count(photographs.len(), "photograph"),
-            listed(&photographs)
-        ));
-    }
-    warnings
+    let unseen = (!objects.is_empty()).then(|| {
+        let (count, names) = (count(objects.len(), "object"), listed(&objects));
+        format!("no photograph sees {count}: {names}")
+    });
+    let blind = (!photographs.is_empty()).then(|| {
+        let (count, names) = (count(photographs.len(), "photograph"), listed(&photographs));
+        format!("{count} see nothing of the mesh: {names}")
+    });
+    unseen.into_iter().chain(blind).collect()
 }
 
 /// "1 object", "1,234 objects".

@@ -1,11 +1,27 @@
 //! What the photographs see: id buffers, seen sides of objects, and the seen fraction of the mesh's area.
 
+use crate::math::cumulative::Cumulative;
 use crate::math::rng::Stream;
+use crate::math::warp::uniform_triangle;
 use crate::scene::Scene;
+use crate::scene::camera::Camera;
 use crate::scene::geometry::Ray;
-pub use crate::scene::ids::{IdBuffers, NOTHING};
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
+
+/// Marks pixels that see no triangle.
+pub const NOTHING: u32 = u32::MAX;
+
+/// The triangle seen by the centre of each pixel.
+#[derive(Debug, Clone)]
+pub struct IdBuffers {
+    /// For each frame, row by row from the top left, a triangle's index or [`NOTHING`].
+    pub triangles: Vec<Vec<u32>>,
+    /// For each object, the number of pixels that see its front.
+    pub front_pixels: Vec<u64>,
+    /// For each object, the number of pixels that see its back.
+    pub back_pixels: Vec<u64>,
+}
 
 impl Scene {
     /// The id buffers of all cameras, computed at the first call.
@@ -17,23 +33,15 @@ impl Scene {
 impl IdBuffers {
     /// Casts one ray through the centre of every pixel of every camera.
     pub fn new(scene: &Scene) -> Self {
-        let triangles: Vec<Vec<u32>> = scene
-            .cameras
-            .iter()
-            .map(|camera| {
-                let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
-                (0..height)
-                    .into_par_iter()
-                    .flat_map_iter(|y| (0..width).map(move |x| (x, y)))
-                    .map(|(x, y)| {
-                        let ray = camera.ray(Vec2::new(x as f32 + 0.5, y as f32 + 0.5));
-                        scene.intersect(&ray).map_or(NOTHING, |hit| hit.triangle)
-                    })
-                    .collect()
-            })
-            .collect();
+        let triangles = |camera: &Camera| {
+            let seen = |pixel| {
+                let hit = scene.intersect(&camera.ray(camera.corner(pixel) + 0.5));
+                hit.map_or(NOTHING, |hit| hit.triangle)
+            };
+            (0..camera.pixels()).into_par_iter().map(seen).collect()
+        };
         let mut buffers = Self {
-            triangles,
+            triangles: scene.cameras.iter().map(triangles).collect(),
             front_pixels: Vec::new(),
             back_pixels: Vec::new(),
         };
@@ -60,44 +68,47 @@ impl IdBuffers {
             }
         }
     }
+
+    /// The number of pixels that see an object, from either side.
+    pub fn seen_pixels(&self, object: usize) -> u64 {
+        self.front_pixels[object] + self.back_pixels[object]
+    }
+
+    /// The number of pixels of a frame that see the mesh.
+    pub fn pixels_on_mesh(&self, frame: usize) -> u64 {
+        let seen = self.triangles[frame].iter().filter(|&&t| t != NOTHING);
+        seen.count() as u64
+    }
 }
 
 /// The fraction of the mesh's area that any camera sees, from either side, estimated from `samples` points.
 ///
 /// Points are stratified by area and deterministic; the standard error is at most ½ / √samples.
 pub fn seen_area_fraction(scene: &Scene, samples: u32) -> f64 {
-    let mut sum = 0.0;
-    let cumulative: Vec<f64> = scene
-        .areas
-        .iter()
-        .map(|&area| {
-            sum += f64::from(area);
-            sum
-        })
-        .collect();
-    if sum <= 0.0 || samples == 0 {
+    let areas = Cumulative::new(scene.areas.iter().map(|&area| f64::from(area)));
+    if areas.total() <= 0.0 || samples == 0 {
         return 0.0;
     }
     let seen = (0..samples)
         .into_par_iter()
         .filter(|&sample| {
             let mut stream = Stream::new(0, 0, 0, u64::from(sample));
-            let target = (f64::from(sample) + stream.uniform_f64()) / f64::from(samples) * sum;
-            let triangle = cumulative
-                .partition_point(|&c| c <= target)
-                .min(cumulative.len() - 1) as u32;
+            let stratum = (f64::from(sample) + stream.uniform_f64()) / f64::from(samples);
+            let Some(triangle) = areas.index_at(stratum * areas.total()) else {
+                return false;
+            };
+            let triangle = triangle as u32;
             let [a, b, c] = scene.corners(triangle);
-            let [u, v] = crate::math::warp::uniform_triangle(stream.uniform2());
+            let [u, v] = uniform_triangle(stream.uniform2());
             let point = a * (1.0 - u - v) + b * u + c * v;
-            (0..scene.cameras.len()).any(|camera| sees(scene, camera, point, triangle))
+            (scene.cameras.iter()).any(|camera| sees(scene, camera, point, triangle))
         })
         .count();
     seen as f64 / f64::from(samples)
 }
 
 /// Whether a camera sees a point of a triangle.
-fn sees(scene: &Scene, camera: usize, point: Vec3, triangle: u32) -> bool {
-    let camera = &scene.cameras[camera];
+fn sees(scene: &Scene, camera: &Camera, point: Vec3, triangle: u32) -> bool {
     if camera.project(point).is_none() {
         return false;
     }

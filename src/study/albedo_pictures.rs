@@ -47,15 +47,6 @@ fn decibel(squares: f64, values: u64) -> Option<f64> {
     (values > 0 && squares > 0.0).then(|| -10.0 * (squares / values as f64).log10())
 }
 
-/// One pixel of the estimate.
-#[derive(Clone, Copy)]
-struct Seen {
-    /// Object at the pixel's centre.
-    object: Option<u32>,
-    /// Mean albedo over the pixel; `None` if part of it sees an emitter or no surface.
-    albedo: Option<Vec3>,
-}
-
 /// Compares estimated and true albedo in all frames, and counts the pixels that see each object. `true_albedo`
 /// returns a frame's true albedo by rows, or `None` if it has none.
 ///
@@ -84,13 +75,13 @@ pub fn compare(
         let known = true_albedo(index, frame)?;
         let grid = if known.is_some() { SIDE } else { 0 };
         let seen = sample_pixels(scene, &camera, &materials, &emitters, grid);
-        for (pixel, seen) in seen.iter().enumerate() {
-            let Some(object) = seen.object.map(|o| o as usize) else {
+        for (pixel, seen) in seen.into_iter().enumerate() {
+            let Some((object, albedo)) = seen else {
                 continue;
             };
             errors.seen_pixels[object] += 1;
             let known = known.as_ref().and_then(|k| k.get(pixel));
-            if let Some((albedo, known)) = seen.albedo.zip(known) {
+            if let Some((albedo, known)) = albedo.zip(known) {
                 let known = known.as_dvec3();
                 errors.squares += (albedo.as_dvec3() - known).length_squared();
                 errors.values += 3;
@@ -109,52 +100,45 @@ pub fn seen_pixels(capture: &Capture, scene: &Scene) -> Vec<u64> {
     let mut seen = vec![0; scene.objects.len()];
     for frame in &capture.frames {
         let camera = Camera::new(&frame.intrinsics, &frame.pose, scene.origin);
-        for object in sample_pixels(scene, &camera, &[], &[], 0)
-            .into_iter()
-            .filter_map(|seen| seen.object)
-        {
-            seen[object as usize] += 1;
+        let pixels = sample_pixels(scene, &camera, &[], &[], 0);
+        for (object, _) in pixels.into_iter().flatten() {
+            seen[object] += 1;
         }
     }
     seen
 }
 
-/// Samples every pixel: its object at the centre, and its mean albedo at `grid` × `grid` points.
+/// Samples every pixel: the object at its centre, and its mean albedo at `grid` × `grid` points, which is `None` if part of it sees
+/// an emitter or no surface.
 fn sample_pixels(
     scene: &Scene,
     camera: &Camera,
     materials: &[Material],
     emitters: &[bool],
     grid: u32,
-) -> Vec<Seen> {
-    let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
-    let at = |x: f32, y: f32| {
-        let hit = scene.intersect(&camera.ray(Vec2::new(x, y)))?;
-        Some((scene.object_of[hit.triangle as usize], hit))
+) -> Vec<Option<(usize, Option<Vec3>)>> {
+    let at = |point: Vec2| {
+        let hit = scene.intersect(&camera.ray(point))?;
+        Some((scene.object_of[hit.triangle as usize] as usize, hit))
     };
-    let albedo = |x: u32, y: u32| {
+    let albedo = |corner: Vec2| {
         let mut sum = Vec3::ZERO;
         for i in 0..grid * grid {
             let offset = |i: u32| (i as f32 + 0.5) / grid as f32;
-            let (object, hit) = at(x as f32 + offset(i % grid), y as f32 + offset(i / grid))?;
-            if emitters[object as usize] {
+            let (object, hit) = at(corner + Vec2::new(offset(i % grid), offset(i / grid)))?;
+            if emitters[object] {
                 return None;
             }
-            sum += materials.get(object as usize)?.albedo_at(&hit);
+            sum += materials.get(object)?.albedo_at(&hit);
         }
         (grid > 0).then(|| sum / (grid * grid) as f32)
     };
-    (0..u64::from(width) * u64::from(height))
+    (0..camera.pixels())
         .into_par_iter()
         .map(|pixel| {
-            let (x, y) = (
-                (pixel % u64::from(width)) as u32,
-                (pixel / u64::from(width)) as u32,
-            );
-            Seen {
-                object: at(x as f32 + 0.5, y as f32 + 0.5).map(|(object, _)| object),
-                albedo: albedo(x, y),
-            }
+            let corner = camera.corner(pixel);
+            let (object, _) = at(corner + 0.5)?;
+            Some((object, albedo(corner)))
         })
         .collect()
 }

@@ -8,7 +8,7 @@ use crate::inverse::estimate::{ENOUGH_PIXELS, Estimate, ObjectEstimate};
 use crate::math::stats::quantile;
 use crate::scene::Scene;
 use crate::study::albedo_pictures;
-use crate::study::emission::{self, EmissionErrors, mean};
+use crate::study::emission::{self, mean};
 use glam::DVec3;
 use serde::{Serialize, Serializer};
 use std::path::Path;
@@ -25,7 +25,7 @@ pub struct Evaluation {
     pub albedo_rel_median: Option<f64>,
     /// Its 95th percentile.
     pub albedo_rel_p95: Option<f64>,
-    /// Peak signal-to-noise ratio in dB against the true albedo pictures, peak 1.
+    /// Peak signal-to-noise ratio in dB against the true albedo pictures, peak 1; `None` where these were not compared.
     pub albedo_psnr: Option<f64>,
     /// The same for the best estimate of one colour per object.
     pub albedo_psnr_constant_per_object: Option<f64>,
@@ -43,7 +43,7 @@ pub struct Evaluation {
 }
 
 /// The errors of one object.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ObjectErrors {
     /// Number of pixels whose centre sees it.
     pub pixels: u64,
@@ -77,25 +77,6 @@ pub struct Reference {
     open_scale: bool,
 }
 
-/// Errors that need no pictures.
-#[derive(Debug, Clone)]
-pub struct ObjectSummary {
-    /// Objects scored for their albedo.
-    pub objects: usize,
-    /// Mean absolute error of albedo over scored objects and RGB.
-    pub albedo_mae: Option<f64>,
-    /// Median over scored objects of the relative error over RGB.
-    pub albedo_rel_median: Option<f64>,
-    /// Its 95th percentile.
-    pub albedo_rel_p95: Option<f64>,
-    /// Median over true emitters of the relative error over RGB.
-    pub emission_rel_median: Option<f64>,
-    /// Errors of the emission.
-    pub emission: EmissionErrors,
-    /// Every object of the truth.
-    pub per_object: Vec<(String, ObjectErrors)>,
-}
-
 impl Reference {
     /// The reference of `scene`; `capture` has cameras at the full size of their `photographs`.
     pub fn new(
@@ -111,8 +92,8 @@ impl Reference {
         }
     }
 
-    /// Compares an estimate object by object.
-    pub fn errors(&self, scene: &Scene, estimate: &Estimate) -> ObjectSummary {
+    /// Compares an estimate object by object, without pictures.
+    pub fn errors(&self, scene: &Scene, estimate: &Estimate) -> Evaluation {
         let emission = emission::compare(scene, estimate, &self.truth, self.open_scale);
         let estimates = estimate.objects.iter().zip(&self.seen_pixels);
         let per_object: Vec<(String, ObjectErrors)> = (scene.objects.iter().zip(estimates))
@@ -140,13 +121,17 @@ impl Reference {
         let mut lamps: Vec<f64> = (per_object.iter())
             .filter_map(|(_, o)| o.emission_rel)
             .collect();
-        ObjectSummary {
+        Evaluation {
             objects: scored.len(),
             albedo_mae: mean(&absolute),
             albedo_rel_median: quantile(&mut relative, 0.5),
             albedo_rel_p95: quantile(&mut relative, 0.95),
+            albedo_psnr: None,
+            albedo_psnr_constant_per_object: None,
+            emission_iou: emission.iou,
+            emission_log_mse: emission.log_mse,
             emission_rel_median: quantile(&mut lamps, 0.5),
-            emission,
+            emission_scale: emission.scale,
             per_object,
         }
     }
@@ -174,19 +159,10 @@ pub fn evaluate(
         seen_pixels: pictures.seen_pixels.clone(),
         open_scale: open_scale(photographs),
     };
-    let errors = reference.errors(scene, estimate);
     Ok(Evaluation {
-        objects: errors.objects,
-        albedo_mae: errors.albedo_mae,
-        albedo_rel_median: errors.albedo_rel_median,
-        albedo_rel_p95: errors.albedo_rel_p95,
         albedo_psnr: pictures.psnr(),
         albedo_psnr_constant_per_object: pictures.psnr_constant_per_object(),
-        emission_iou: errors.emission.iou,
-        emission_log_mse: errors.emission.log_mse,
-        emission_rel_median: errors.emission_rel_median,
-        emission_scale: errors.emission.scale,
-        per_object: errors.per_object,
+        ..reference.errors(scene, estimate)
     })
 }
 

@@ -31,12 +31,10 @@ impl Machine {
 
     /// As text: "2 threads of Intel Xeon (2 cores)".
     pub fn words(&self) -> String {
-        let Self {
-            cpu,
-            cores,
-            threads,
-        } = self;
-        let s = if *threads == 1 { "" } else { "s" };
-        format!("{threads} thread{s} of {cpu} ({cores} cores)")
+        let s = if self.threads == 1 { "" } else { "s" };
+        format!(
+            "{} thread{s} of {} ({} cores)",
+            self.threads, self.cpu, self.cores
+        )
     }
 }

@@ -6,4 +6,5 @@ pub mod evaluate;
 pub mod experiments;
 pub mod families;
 pub mod machine;
+mod subject;
 pub mod trade;

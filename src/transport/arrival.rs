@@ -153,16 +153,10 @@ mod tests {
         let pixels = (0..32 * 16).map(|i| Vec3::splat(if i % 32 < 3 { 9.0 } else { 0.4 }));
         let sky = Sky(Environment::new(32, 16, pixels.collect()).expect("light"));
         let surface = SurfacePoint {
-            point: Vec3::ZERO,
             corners: [Vec3::ZERO, Vec3::X, Vec3::Y],
             normal: Vec3::Z,
             shading_normal: Vec3::Z,
-            albedo: Vec3::ZERO,
-            emission: Vec3::ZERO,
-            lobe: None,
-            object: 0,
-            triangle: 0,
-            t: 1.0,
+            ..SurfacePoint::default()
         };
         let frame = Frame::around(Vec3::Z);
         let wo = Vec3::new(0.6, 0.2, 0.5).normalize();

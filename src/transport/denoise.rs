@@ -65,15 +65,19 @@ impl Denoiser {
         let Some(oidn) = oidn else {
             return denoise(a, b, guides);
         };
-        let halves = a.pixels.iter().zip(&b.pixels);
-        let mean = Picture {
-            pixels: halves.map(|(a, b)| (*a + *b) * 0.5).collect(),
-            ..*a
-        };
-        oidn.denoise(&mean, guides).unwrap_or_else(|error| {
+        oidn.denoise(&mean(a, b), guides).unwrap_or_else(|error| {
             say::warning(format_args!("Open Image Denoise: {error}"));
             denoise(a, b, guides)
         })
+    }
+}
+
+/// The mean of two pictures of one view.
+fn mean(a: &Picture, b: &Picture) -> Picture {
+    let halves = a.pixels.iter().zip(&b.pixels);
+    Picture {
+        pixels: halves.map(|(a, b)| (*a + *b) * 0.5).collect(),
+        ..*a
     }
 }
 
@@ -81,10 +85,10 @@ impl Denoiser {
 /// Emitters, background and non-finite pixels are not changed.
 pub fn denoise(a: &Picture, b: &Picture, guides: &[Option<Guide>]) -> Picture {
     let width = a.width as usize;
-    let halves = a.pixels.iter().zip(&b.pixels);
-    let mean: Vec<Vec3> = halves.map(|(a, b)| (*a + *b) * 0.5).collect();
+    let unfiltered = mean(a, b);
+    let mean = &unfiltered.pixels;
     if guides.len() != mean.len() || b.pixels.len() != mean.len() {
-        return Picture { pixels: mean, ..*a };
+        return unfiltered;
     }
 
     // Demodulate, and estimate the variance of luminance from the two pictures, averaged over similar pixels.
@@ -322,13 +326,8 @@ mod tests {
     fn noise_goes_while_colours_edges_and_slopes_of_light_stay() {
         let (guides, truth) = scene();
         let (a, b) = (noisy(&truth, 1, 0.8), noisy(&truth, 2, 0.8));
-        let both = a.pixels.iter().zip(&b.pixels).map(|(a, b)| (*a + *b) * 0.5);
-        let mean = Picture {
-            pixels: both.collect(),
-            ..truth
-        };
         let smooth = denoise(&a, &b, &guides);
-        let (before, after) = (error(&mean, &truth), error(&smooth, &truth));
+        let (before, after) = (error(&mean(&a, &b), &truth), error(&smooth, &truth));
         assert!(after < 0.25 * before, "{before} {after}");
         // What has no noise stays as it is, to rounding.
         let clean = denoise(&truth, &truth, &guides);

@@ -1,8 +1,9 @@
 //! Emitter sampling: an object from a Fenwick tree of weights, then a point uniformly by area.
 
 use crate::math::color::luminance;
+use crate::math::cumulative::Cumulative;
 use crate::math::warp;
-use crate::scene::Scene;
+use crate::scene::{Object, Scene};
 use glam::Vec3;
 
 /// Binary indexed tree over non-negative weights (Fenwick 1994), with logarithmic sampling and updates.
@@ -111,14 +112,6 @@ pub fn powers(scene: &Scene, emission: impl Iterator<Item = Vec3>) -> Vec<f64> {
         .collect()
 }
 
-/// Uniform area sampling of one object.
-#[derive(Debug, Clone)]
-struct AreaDistribution {
-    triangles: Vec<u32>,
-    /// Cumulative areas of the triangles in m².
-    cumulative: Vec<f64>,
-}
-
 /// A point sampled on an object.
 #[derive(Debug, Clone, Copy)]
 pub struct AreaSample {
@@ -132,34 +125,18 @@ pub struct AreaSample {
 #[derive(Debug, Clone)]
 pub struct Emitters {
     tree: FenwickTree,
-    objects: Vec<AreaDistribution>,
+    /// For each object, the areas of its triangles in m².
+    areas: Vec<Cumulative>,
 }
 
 impl Emitters {
     /// Emitters of a scene with one weight per object (in the paper: area × luminance of emission).
     pub fn new(scene: &Scene, weights: &[f64]) -> Self {
-        let objects = scene
-            .objects
-            .iter()
-            .map(|object| {
-                let mut sum = 0.0;
-                let cumulative = object
-                    .triangles
-                    .iter()
-                    .map(|&t| {
-                        sum += f64::from(scene.areas[t as usize]);
-                        sum
-                    })
-                    .collect();
-                AreaDistribution {
-                    triangles: object.triangles.clone(),
-                    cumulative,
-                }
-            })
-            .collect();
+        let area = |&triangle: &u32| f64::from(scene.areas[triangle as usize]);
+        let areas = |object: &Object| Cumulative::new(object.triangles.iter().map(area));
         Self {
             tree: FenwickTree::new(weights),
-            objects,
+            areas: scene.objects.iter().map(areas).collect(),
         }
     }
 
@@ -182,8 +159,8 @@ impl Emitters {
     #[inline]
     pub fn pdf(&self, object: u32) -> f32 {
         let index = object as usize;
-        match self.objects[index].cumulative.last() {
-            Some(&area) if area > 0.0 => (self.tree.probability(index) / area) as f32,
+        match self.areas[index].total() {
+            area if area > 0.0 => (self.tree.probability(index) / area) as f32,
             _ => 0.0,
         }
     }
@@ -194,23 +171,18 @@ impl Emitters {
     pub fn sample(&self, scene: &Scene, choice: f64, u: [f32; 2]) -> Option<(u32, AreaSample)> {
         let object = self.tree.sample(choice)?;
         // u[0] selects the triangle and is rescaled.
-        let distribution = &self.objects[object];
-        let area = *distribution.cumulative.last()?;
+        let areas = &self.areas[object];
         let low_bits = (choice * (1u64 << 29) as f64).fract() / f64::from(1 << 24);
-        let target = (f64::from(u[0]) + low_bits) * area;
-        let index = distribution
-            .cumulative
-            .partition_point(|&c| c <= target)
-            .min(distribution.triangles.len() - 1);
-        let before = index.checked_sub(1);
-        let low = before.map_or(0.0, |before| distribution.cumulative[before]);
-        let size = distribution.cumulative[index] - low;
+        let target = (f64::from(u[0]) + low_bits) * areas.total();
+        let index = areas.index_at(target)?;
+        let low = areas.before(index);
+        let size = areas.sums()[index] - low;
         let within = if size > 0.0 {
             ((target - low) / size) as f32
         } else {
             0.0
         };
-        let triangle = distribution.triangles[index];
+        let triangle = scene.objects[object].triangles[index];
         let [b1, b2] = warp::uniform_triangle([within.clamp(0.0, 1.0), u[1]]);
         let [a, b, c] = scene.corners(triangle);
         let point = a * (1.0 - b1 - b2) + b * b1 + c * b2;

@@ -1,6 +1,7 @@
 //! Environment light: a map of radiance by direction, infinitely far or on a box around the mesh, and a sun.
 
 use crate::math::color::luminance;
+use crate::math::cumulative::Cumulative;
 use crate::transport::sun::Sun;
 use crate::transport::surroundings::Surroundings;
 use glam::Vec3;
@@ -16,7 +17,7 @@ pub struct Environment {
     height: usize,
     pixels: Vec<Vec3>,
     /// Cumulative luminance × solid angle over the pixels.
-    cumulative: Vec<f64>,
+    cumulative: Cumulative,
     /// The distance of the light.
     surroundings: Surroundings,
     /// Radiance from above the horizon, if it differs, and the up vector.
@@ -104,15 +105,12 @@ impl Environment {
             let direction = sun.sample(u);
             return Some((direction, self.pdf(origin, direction)));
         }
-        let total = *self.cumulative.last()?;
+        let total = self.cumulative.total();
         if total <= 0.0 {
             return None;
         }
         let target = (choice - share) / (1.0 - share) * total;
-        let index = self
-            .cumulative
-            .partition_point(|&c| c <= target)
-            .min(self.pixels.len() - 1);
+        let index = self.cumulative.index_at(target)?;
         let (row, column) = (index / self.width, index % self.width);
         // Sample uniformly by solid angle within the pixel: uniformly in cosθ and φ.
         let (top, bottom) = row_cosines(row, self.height);
@@ -163,16 +161,12 @@ impl Environment {
 
     /// Cumulative luminance × solid angle over the pixels.
     pub fn cumulative(&self) -> &[f64] {
-        &self.cumulative
+        self.cumulative.sums()
     }
 
     /// Total luminance × solid angle, with the sun's.
     pub fn power(&self) -> f64 {
-        self.map_power() + self.sun_power()
-    }
-
-    fn map_power(&self) -> f64 {
-        self.cumulative.last().copied().unwrap_or(0.0)
+        self.cumulative.total() + self.sun_power()
     }
 
     /// The pixel that light along a ray comes from.
@@ -183,30 +177,26 @@ impl Environment {
 
     /// Pdf per solid angle of the map's directions within a pixel.
     pub fn pixel_pdf(&self, index: usize) -> f32 {
-        let total = self.map_power();
+        let total = self.cumulative.total();
         if total <= 0.0 {
             return 0.0;
         }
-        let before = index.checked_sub(1);
-        let low = before.map_or(0.0, |before| self.cumulative[before]);
+        let weight = self.cumulative.sums()[index] - self.cumulative.before(index);
         let solid_angle = row_solid_angle(index / self.width, self.width, self.height);
-        ((self.cumulative[index] - low) / total / solid_angle) as f32
+        (weight / total / solid_angle) as f32
     }
 }
 
 /// Cumulative luminance × solid angle over a map's pixels.
-fn cumulative(width: usize, height: usize, pixels: impl Iterator<Item = Vec3>) -> Vec<f64> {
-    let mut sum = 0.0;
-    let added = pixels.enumerate().map(|(i, radiance)| {
+fn cumulative(width: usize, height: usize, pixels: impl Iterator<Item = Vec3>) -> Cumulative {
+    Cumulative::new(pixels.enumerate().map(|(i, radiance)| {
         let weight = f64::from(luminance(radiance)) * row_solid_angle(i / width, width, height);
-        sum += if weight.is_finite() {
+        if weight.is_finite() {
             weight.max(0.0)
         } else {
             0.0
-        };
-        sum
-    });
-    added.collect()
+        }
+    }))
 }
 
 /// The pixel index of a unit direction in a `width` × `height` map, row by row.

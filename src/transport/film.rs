@@ -2,6 +2,7 @@
 
 use crate::math::rng::Stream;
 use crate::scene::camera::Camera;
+use crate::transport::arrival::RayCount;
 use crate::transport::path::{PathOptions, radiance};
 use crate::transport::world::World;
 use glam::{DVec3, Vec2, Vec3};
@@ -33,7 +34,7 @@ impl Film {
             width,
             height,
             samples: 0,
-            sums: vec![DVec3::ZERO; width as usize * height as usize],
+            sums: vec![DVec3::ZERO; camera.pixels()],
             rays: 0,
             rejected: 0,
         }
@@ -51,26 +52,12 @@ impl Film {
         samples: u32,
     ) {
         let rows = 0..self.height;
-        self.trace(world, camera, options, (seed, frame), rows, samples);
-        self.samples += samples;
+        self.add_rows(world, camera, options, (seed, frame), rows, samples);
     }
 
-    /// Adds one path to each pixel of some rows, keyed as in [`Film::add`]. The call with the last row increments the number of
+    /// Adds `samples` paths to each pixel of some rows, keyed as in [`Film::add`]. The call with the last row increases the number of
     /// samples; until then [`Film::mean`] is invalid.
     pub fn add_rows(
-        &mut self,
-        world: &impl World,
-        camera: &Camera,
-        options: &PathOptions,
-        key: (u64, u64),
-        rows: Range<u32>,
-    ) {
-        let last = rows.end >= self.height;
-        self.trace(world, camera, options, key, rows, 1);
-        self.samples += u32::from(last);
-    }
-
-    fn trace(
         &mut self,
         world: &impl World,
         camera: &Camera,
@@ -79,33 +66,27 @@ impl Film {
         rows: Range<u32>,
         samples: u32,
     ) {
+        let is_last = rows.end >= self.height;
         let first = self.samples;
         let width = self.width as usize;
-        let top = rows.start as usize;
-        let pixels = top * width..rows.end.min(self.height) as usize * width;
-        let counts: Vec<(u64, u64)> = self.sums[pixels]
-            .par_chunks_mut(width.max(1))
-            .enumerate()
-            .map(|(row, sums)| {
-                let row = top + row;
-                let (mut rays, mut rejected) = (0, 0);
-                for (column, sum) in sums.iter_mut().enumerate() {
-                    let pixel = (row * width + column) as u64;
-                    for index in first..first + samples {
-                        let mut stream = Stream::new(seed, frame, pixel, u64::from(index));
-                        let [dx, dy] = stream.uniform2();
-                        let ray = camera.ray(Vec2::new(column as f32 + dx, row as f32 + dy));
-                        let sample = radiance(world, &ray, &mut stream, options);
-                        *sum += sample.radiance.as_dvec3();
-                        rays += u64::from(sample.rays);
-                        rejected += u64::from(sample.rejected);
-                    }
-                }
-                (rays, rejected)
-            })
-            .collect();
-        self.rays += counts.iter().map(|c| c.0).sum::<u64>();
-        self.rejected += counts.iter().map(|c| c.1).sum::<u64>();
+        let pixels = rows.start as usize * width..rows.end.min(self.height) as usize * width;
+        let add = |(sum, pixel): (&mut DVec3, usize)| {
+            let mut cast = RayCount::default();
+            for index in first..first + samples {
+                let mut stream = Stream::new(seed, frame, pixel as u64, u64::from(index));
+                let ray = camera.ray(camera.corner(pixel) + Vec2::from(stream.uniform2()));
+                let sample = radiance(world, &ray, &mut stream, options);
+                *sum += sample.radiance.as_dvec3();
+                cast.rays += u64::from(sample.rays);
+                cast.rejected += u64::from(sample.rejected);
+            }
+            cast
+        };
+        let sums = self.sums[pixels.clone()].par_iter_mut();
+        let cast: RayCount = sums.zip(pixels).map(add).sum();
+        self.rays += cast.rays;
+        self.rejected += cast.rejected;
+        self.samples += if is_last { samples } else { 0 };
     }
 
     /// Mean radiance of each pixel; zero before the first sample.

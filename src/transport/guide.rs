@@ -83,17 +83,15 @@ fn guides_of(
     around: &[[f32; 2]],
     choose: impl Fn(usize, &dyn Fn([f32; 2]) -> Ray) -> Option<Ray> + Sync,
 ) -> Vec<Option<Guide>> {
-    let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
-    let guide = |pixel: u32| {
-        let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
-        let ray_at = |offset: [f32; 2]| camera.ray(corner + Vec2::from(offset));
-        let ray = choose(pixel as usize, &ray_at)?;
+    let guide = |pixel: usize| {
+        let ray_at = |offset: [f32; 2]| camera.ray(camera.corner(pixel) + Vec2::from(offset));
+        let ray = choose(pixel, &ray_at)?;
         let seen = world.intersect(&ray)?;
         let towards = -ray.direction.normalize_or_zero();
         let front = seen.normal.dot(towards) > 0.0;
         let (mut albedo, mut taps) = (seen.albedo, 1.0);
         for &offset in around {
-            let beside = world.intersect(&camera.ray(corner + Vec2::from(offset)));
+            let beside = world.intersect(&ray_at(offset));
             if let Some(beside) = beside.filter(|b| b.object == seen.object) {
                 albedo += beside.albedo;
                 taps += 1.0;
@@ -113,5 +111,5 @@ fn guides_of(
             object: seen.object,
         })
     };
-    (0..width * height).into_par_iter().map(guide).collect()
+    (0..camera.pixels()).into_par_iter().map(guide).collect()
 }

@@ -123,29 +123,23 @@ impl Split {
         frame: u64,
         samples: u32,
     ) -> Vec<Picture> {
-        let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
         let count = self.sources.len();
-        let mut sums = vec![DVec3::ZERO; width as usize * height as usize * count];
-        let row_length = width as usize * count;
-        sums.par_chunks_mut(row_length.max(1))
-            .enumerate()
-            .for_each(|(row, sums)| {
-                let mut parts = Parts::new();
-                for (column, sums) in sums.chunks_mut(count).enumerate() {
-                    let pixel = (row * width as usize + column) as u64;
-                    for index in 0..samples {
-                        let mut stream = Stream::new(seed, frame, pixel, u64::from(index));
-                        let [dx, dy] = stream.uniform2();
-                        let ray = camera.ray(Vec2::new(column as f32 + dx, row as f32 + dy));
-                        self.add(world, &ray, &mut stream, options, &mut parts, sums);
-                    }
+        let mut sums = vec![DVec3::ZERO; camera.pixels() * count];
+        sums.par_chunks_mut(count.max(1)).enumerate().for_each_init(
+            Parts::new,
+            |parts, (pixel, sums)| {
+                for index in 0..samples {
+                    let mut stream = Stream::new(seed, frame, pixel as u64, u64::from(index));
+                    let ray = camera.ray(camera.corner(pixel) + Vec2::from(stream.uniform2()));
+                    self.add(world, &ray, &mut stream, options, parts, sums);
                 }
-            });
+            },
+        );
         let scale = 1.0 / f64::from(samples.max(1));
         (0..count)
             .map(|layer| Picture {
-                width,
-                height,
+                width: camera.intrinsics.width,
+                height: camera.intrinsics.height,
                 pixels: layer_of(&sums, layer, count, scale),
             })
             .collect()

@@ -72,13 +72,8 @@ pub fn radiance(
     stream: &mut Stream,
     options: &PathOptions,
 ) -> PathSample {
-    follow(
-        world,
-        PathState::from_camera(camera_ray),
-        stream,
-        options,
-        &mut |_, _| {},
-    )
+    let state = PathState::from_camera(camera_ray);
+    follow(world, state, stream, options, &mut |_, _| {})
 }
 
 /// [`radiance`] split by origin: fills `parts` with the contributions of the path's vertices, whose sum is the sample's radiance up

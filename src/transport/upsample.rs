@@ -100,14 +100,9 @@ mod tests {
 
     /// A floor in stripes of two colours, with a lamp on it and a wall of another object above; light that falls to the right.
     fn view(width: u32, height: u32) -> (Picture, Vec<Option<Guide>>) {
-        let at = |x: u32, y: u32| {
-            [
-                (x as f32 + 0.5) / width as f32,
-                (y as f32 + 0.5) / height as f32,
-            ]
-        };
+        let across = |x: u32| (x as f32 + 0.5) / width as f32;
         let guide = |x: u32, y: u32| {
-            let [u, v] = at(x, y);
+            let (u, v) = (across(x), (y as f32 + 0.5) / height as f32);
             let wall = v < 0.5;
             let lamp = !wall && u > 0.7 && v > 0.7;
             (v > 0.1).then(|| Guide {
@@ -126,7 +121,7 @@ mod tests {
             let light = if y < height / 2 {
                 3.0
             } else {
-                1.0 - 0.8 * at(x, y)[0]
+                1.0 - 0.8 * across(x)
             };
             match &guides[(y * width + x) as usize] {
                 Some(guide) => guide.albedo * light + guide.emission,
@@ -140,17 +135,16 @@ mod tests {
     fn colours_and_edges_are_as_sharp_as_the_view_and_light_is_smooth() {
         let (small, seen_small) = view(20, 20);
         let (truth, seen) = view(160, 160);
-        let found = upsample(&small, &seen_small, [160, 160], &seen);
-        let worst = (found.pixels.iter().zip(&truth.pixels))
-            .map(|(found, truth)| ((*found - *truth) / *truth).abs().max_element())
-            .fold(0.0, f32::max);
+        let worst = |found: Picture| {
+            let pixels = found.pixels.iter().zip(&truth.pixels);
+            let off = pixels.map(|(a, b)| ((*a - *b) / *b).abs().max_element());
+            off.fold(0.0, f32::max)
+        };
+        let from_small = worst(upsample(&small, &seen_small, [160, 160], &seen));
         // Half a pixel of the small render at the picture's edges, where light cannot be interpolated: 0.8 / 40 of light 0.2.
-        assert!(worst < 0.1, "{worst}");
+        assert!(from_small < 0.1, "{from_small}");
         // A render of the same size changes by its interpolation alone.
-        let same = upsample(&truth, &seen, [160, 160], &seen);
-        let worst = (same.pixels.iter().zip(&truth.pixels))
-            .map(|(found, truth)| ((*found - *truth) / *truth).abs().max_element())
-            .fold(0.0, f32::max);
-        assert!(worst < 0.01, "{worst}");
+        let same = worst(upsample(&truth, &seen, [160, 160], &seen));
+        assert!(same < 0.01, "{same}");
     }
 }

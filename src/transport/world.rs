@@ -6,7 +6,7 @@ use crate::transport::material::Lobe;
 use glam::Vec3;
 
 /// A surface point with all data for scattering.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct SurfacePoint {
     /// Position.
     pub point: Vec3,

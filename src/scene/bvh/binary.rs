@@ -35,15 +35,6 @@ impl Binary {
     }
 }
 
-/// Granularity of a build.
-#[derive(Debug, Clone, Copy)]
-struct Granularity {
-    /// Ranges of more primitives are built in parallel.
-    parallel_above: usize,
-    /// Maximum number of triangles in a leaf, or one group.
-    max_leaf: usize,
-}
-
 /// Subtrees with more primitives than this, and than 1 / [`TASKS`] of all, are built and laid out in parallel.
 const MIN_PARALLEL: usize = 8192;
 /// See [`MIN_PARALLEL`].
@@ -54,23 +45,23 @@ pub(super) fn parallel_above(primitives: usize) -> usize {
     MIN_PARALLEL.max(primitives / TASKS)
 }
 
-/// Builds the hierarchy over primitives and reorders them; empty without primitives.
+/// Builds the hierarchy over primitives and reorders them; empty without primitives. Leaves hold at most `max_leaf` triangles, or
+/// one group.
 pub(super) fn build(primitives: &mut [Primitive], max_leaf: usize) -> Vec<Binary> {
-    let granularity = Granularity {
-        parallel_above: parallel_above(primitives.len()),
-        max_leaf,
-    };
     let mut nodes = Vec::new();
     if !primitives.is_empty() {
-        grow(primitives, 0, granularity, &mut nodes);
+        let parallel_above = parallel_above(primitives.len());
+        grow(primitives, 0, parallel_above, max_leaf, &mut nodes);
     }
     nodes
 }
 
+/// Appends the subtree of primitives from `first` on; those of more than `parallel_above` grow in parallel.
 fn grow(
     primitives: &mut [Primitive],
     first: usize,
-    granularity: Granularity,
+    parallel_above: usize,
+    max_leaf: usize,
     nodes: &mut Vec<Binary>,
 ) {
     let bounds = Bounds::of(primitives);
@@ -82,10 +73,10 @@ fn grow(
     }
     let middle = split(primitives);
     let (left, right) = primitives.split_at_mut(middle);
-    let second = if count > granularity.parallel_above {
+    let second = if count > parallel_above {
         let grown = |primitives: &mut [Primitive], first: usize| {
             let mut nodes = Vec::new();
-            grow(primitives, first, granularity, &mut nodes);
+            grow(primitives, first, parallel_above, max_leaf, &mut nodes);
             nodes
         };
         let (left, right) = rayon::join(|| grown(left, first), || grown(right, first + middle));
@@ -94,13 +85,13 @@ fn grow(
         nodes.extend(right);
         second
     } else {
-        grow(left, first, granularity, nodes);
+        grow(left, first, parallel_above, max_leaf, nodes);
         let second = nodes.len();
-        grow(right, first + middle, granularity, nodes);
+        grow(right, first + middle, parallel_above, max_leaf, nodes);
         second
     };
 
-    make_inner_if_cheaper(node, second, granularity.max_leaf, nodes);
+    make_inner_if_cheaper(node, second, max_leaf, nodes);
 }
 
 /// Turns a node from a leaf into an inner node if that costs less; `second` is its right child.

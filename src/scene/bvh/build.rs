@@ -82,31 +82,25 @@ fn lay_out<C: Fn(u32) -> [Vec3; 3] + Sync>(
     binary: &[Binary],
     triangles: usize,
 ) -> Bvh {
-    let mut bvh = Bvh {
-        nodes: Pages::new(Vec::new()),
-        groups: Pages::new(Vec::new()),
-        stack_size: 0,
+    let tree = binary.first().map_or_else(Subtree::default, |root| {
+        // Enlarge boxes by the rounding error of the largest coordinate, so that rays within their faces hit them.
+        let largest = root.bounds.low.abs().max(root.bounds.high.abs());
+        let layout = Layout {
+            corners,
+            primitives,
+            binary,
+            margin: largest.max_element() * 2.0 * f32::EPSILON,
+            parallel_above: parallel_above(primitives.len()) as u32,
+        };
+        layout.subtree(0)
+    });
+    Bvh {
+        nodes: Pages::new(tree.nodes),
+        groups: Pages::new(tree.groups),
+        stack_size: tree.stack,
         triangles,
         instructions: InstructionSet::widest(),
-    };
-    if binary.is_empty() {
-        return bvh;
     }
-    // Enlarge boxes by the rounding error of the largest coordinate, so that rays within their faces hit them.
-    let bounds = binary[0].bounds;
-    let largest = bounds.low.abs().max(bounds.high.abs()).max_element();
-    let layout = Layout {
-        corners,
-        primitives,
-        binary,
-        margin: largest * 2.0 * f32::EPSILON,
-        parallel_above: parallel_above(primitives.len()) as u32,
-    };
-    let tree = layout.subtree(0);
-    bvh.nodes = Pages::new(tree.nodes);
-    bvh.groups = Pages::new(tree.groups);
-    bvh.stack_size = tree.stack;
-    bvh
 }
 
 /// The input of the layout.

@@ -50,6 +50,16 @@ impl<const N: usize> Portable<N> {
     }
 }
 
+/// Methods of two vectors, lane by lane.
+macro_rules! lanewise {
+    ($($name:ident: $f:expr;)*) => {
+        $(#[inline(always)]
+        fn $name(self, other: Self) -> Self {
+            self.zip(other, $f)
+        })*
+    };
+}
+
 impl<const N: usize> Lanes<N> for Portable<N> {
     #[inline(always)]
     fn splat(x: f32) -> Self {
@@ -63,29 +73,13 @@ impl<const N: usize> Lanes<N> for Portable<N> {
     fn store(self) -> [f32; N] {
         self.0
     }
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        self.zip(other, |a, b| a + b)
-    }
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        self.zip(other, |a, b| a - b)
-    }
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        self.zip(other, |a, b| a * b)
-    }
-    #[inline(always)]
-    fn div(self, other: Self) -> Self {
-        self.zip(other, |a, b| a / b)
-    }
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        self.zip(other, |a, b| if a < b { a } else { b })
-    }
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        self.zip(other, |a, b| if a > b { a } else { b })
+    lanewise! {
+        add: |a, b| a + b;
+        sub: |a, b| a - b;
+        mul: |a, b| a * b;
+        div: |a, b| a / b;
+        min: |a, b| if a < b { a } else { b };
+        max: |a, b| if a > b { a } else { b };
     }
     #[inline(always)]
     fn le(self, other: Self) -> u32 {
@@ -142,8 +136,8 @@ mod vectors {
     pub(in crate::scene::bvh) struct Eight(__m256);
 
     macro_rules! lanes {
-        ($name:ident, $width:literal, $set:ident, $load:ident, $store:ident, $add:ident, $sub:ident, $mul:ident,
-         $div:ident, $min:ident, $max:ident, $le:expr, $lt:expr, $mask:ident, $pack:ident) => {
+        ($name:ident, $width:literal: $set:ident $load:ident $store:ident $mask:ident $pack:ident;
+         $($arithmetic:ident $intrinsic:ident,)*; $($comparison:ident $compare:expr,)*) => {
             // SAFETY of every block below: SSE2 is always there, and methods of `Eight` are reached only through
             // `traverse`'s functions with `#[target_feature(enable = "avx2")]`, which are called only where
             // `InstructionSet::widest` found AVX2; loads and stores are unaligned ones on references to arrays of
@@ -163,38 +157,14 @@ mod vectors {
                     unsafe { $store(x.as_mut_ptr(), self.0) };
                     x
                 }
-                #[inline(always)]
-                fn add(self, other: Self) -> Self {
-                    Self(unsafe { $add(self.0, other.0) })
-                }
-                #[inline(always)]
-                fn sub(self, other: Self) -> Self {
-                    Self(unsafe { $sub(self.0, other.0) })
-                }
-                #[inline(always)]
-                fn mul(self, other: Self) -> Self {
-                    Self(unsafe { $mul(self.0, other.0) })
-                }
-                #[inline(always)]
-                fn div(self, other: Self) -> Self {
-                    Self(unsafe { $div(self.0, other.0) })
-                }
-                #[inline(always)]
-                fn min(self, other: Self) -> Self {
-                    Self(unsafe { $min(self.0, other.0) })
-                }
-                #[inline(always)]
-                fn max(self, other: Self) -> Self {
-                    Self(unsafe { $max(self.0, other.0) })
-                }
-                #[inline(always)]
-                fn le(self, other: Self) -> u32 {
-                    unsafe { $mask(($le)(self.0, other.0)) as u32 }
-                }
-                #[inline(always)]
-                fn lt(self, other: Self) -> u32 {
-                    unsafe { $mask(($lt)(self.0, other.0)) as u32 }
-                }
+                $(#[inline(always)]
+                fn $arithmetic(self, other: Self) -> Self {
+                    Self(unsafe { $intrinsic(self.0, other.0) })
+                })*
+                $(#[inline(always)]
+                fn $comparison(self, other: Self) -> u32 {
+                    unsafe { $mask(($compare)(self.0, other.0)) as u32 }
+                })*
                 #[inline(always)]
                 fn pack(entries: &[u32; $width], mask: u32, packed: &mut [u32]) {
                     $pack(entries, mask, packed);
@@ -203,40 +173,16 @@ mod vectors {
         };
     }
 
-    lanes!(
-        Four,
-        4,
-        _mm_set1_ps,
-        _mm_loadu_ps,
-        _mm_storeu_ps,
-        _mm_add_ps,
-        _mm_sub_ps,
-        _mm_mul_ps,
-        _mm_div_ps,
-        _mm_min_ps,
-        _mm_max_ps,
-        _mm_cmple_ps,
-        _mm_cmplt_ps,
-        _mm_movemask_ps,
-        pack_each
-    );
-    lanes!(
-        Eight,
-        8,
-        _mm256_set1_ps,
-        _mm256_loadu_ps,
-        _mm256_storeu_ps,
-        _mm256_add_ps,
-        _mm256_sub_ps,
-        _mm256_mul_ps,
-        _mm256_div_ps,
-        _mm256_min_ps,
-        _mm256_max_ps,
-        _mm256_cmp_ps::<_CMP_LE_OQ>,
-        _mm256_cmp_ps::<_CMP_LT_OQ>,
-        _mm256_movemask_ps,
-        pack_eight
-    );
+    lanes! {
+        Four, 4: _mm_set1_ps _mm_loadu_ps _mm_storeu_ps _mm_movemask_ps pack_each;
+        add _mm_add_ps, sub _mm_sub_ps, mul _mm_mul_ps, div _mm_div_ps, min _mm_min_ps, max _mm_max_ps,;
+        le _mm_cmple_ps, lt _mm_cmplt_ps,
+    }
+    lanes! {
+        Eight, 8: _mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps _mm256_movemask_ps pack_eight;
+        add _mm256_add_ps, sub _mm256_sub_ps, mul _mm256_mul_ps, div _mm256_div_ps, min _mm256_min_ps, max _mm256_max_ps,;
+        le _mm256_cmp_ps::<_CMP_LE_OQ>, lt _mm256_cmp_ps::<_CMP_LT_OQ>,
+    }
 
     /// For each mask, the lanes of its set bits in order, one byte per lane.
     static PACKING: [u64; 256] = packing();

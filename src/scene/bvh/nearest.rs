@@ -24,8 +24,7 @@ pub(super) fn traverse<B: Lanes<WIDTH>, T: Lanes<GROUP>>(
     let mut nearest = Hit {
         t: ray.t_max,
         triangle: u32::MAX,
-        b1: 0.0,
-        b2: 0.0,
+        ..Hit::default()
     };
     let (nodes, groups): (&[Node], &[Group]) = (&bvh.nodes, &bvh.groups);
     let inverse = reciprocal(ray.direction);

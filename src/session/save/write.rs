@@ -135,15 +135,7 @@ pub fn write_checkpoint(folder: &Path, results: &Results) -> Result<()> {
 /// The course of a solve as a table, in order of time: losses in the fit and on held-out pixels where they were measured, and after
 /// each iteration the relative residual of the fit, the relative error that the estimate reports, and the number of unknowns.
 fn losses(progress: &Progress) -> Table {
-    let mut table = Table::new(&[
-        "seconds",
-        "iteration",
-        "train",
-        "held_out",
-        "residual",
-        "stderr",
-        "unknowns",
-    ]);
+    let mut table = Table::new("seconds,iteration,train,held_out,residual,stderr,unknowns");
     use Cell::Empty;
     let measured = progress.losses.iter().map(|p| {
         let values = [p.train.into(), p.held_out.into(), Empty, Empty, Empty];

@@ -8,10 +8,11 @@ use crate::study::experiments::course::{
     CACHE_WITHOUT, Errors, Evaluator, Mark, cache_settings, cached, descend, paper_settings,
 };
 use crate::study::experiments::courses::{
-    self, Kind, Spread, common_mark, comparison, plot, table, words,
+    self, Kind, LOSS, Over, RAYS, SECONDS, Spread, common_mark, comparison, plot, table, words,
 };
 use crate::study::experiments::findings::{Findings, Summary};
 use crate::study::experiments::study::{Bench, Study};
+use std::borrow::Cow;
 
 /// The study.
 pub const STUDY: Study = Study {
@@ -41,19 +42,15 @@ const PAPER: (u64, u64) = (8, 1);
 const WORSE: f64 = 1.05;
 
 fn run(bench: &Bench) -> Result<Findings> {
-    let made;
     let subject = match bench.subject {
-        Some(subject) => subject,
-        None => {
-            made = box_room::photographed("box room", 0.5, 0.25, bench.quick)?;
-            &made
-        }
+        Some(subject) => Cow::Borrowed(subject),
+        None => Cow::Owned(box_room::photographed(bench.quick)?),
     };
     let batches = if bench.quick { QUICK } else { BATCHES };
     let limits = bench.limits(batches.len() * bench.seeds as usize);
 
     // The descents; the transport cache's end is measured below.
-    let gauge = Evaluator::new(subject, paper_settings(1).max_bounces());
+    let gauge = Evaluator::new(&subject, paper_settings(1).max_bounces());
     let course = |index: usize, seed| {
         let (batch, samples) = batches[index];
         let settings = Settings {
@@ -63,21 +60,18 @@ fn run(bench: &Bench) -> Result<Findings> {
         };
         descend(bench, &gauge, &settings, limits)
     };
-    let over_rays = |kinds: &[Kind], cache: &[Mark]| {
-        drawn("rays", |mark| mark.rays as f64, (kinds, batches), cache)
-    };
     let names = batches.iter().map(|&batch| name(batch));
-    let kinds = courses::run(bench, names, course, |kinds| over_rays(kinds, &[]))?;
+    let so_far = |kinds: &[Kind]| drawn(RAYS, (kinds, batches), &[]);
+    let kinds = courses::run(bench, names, course, so_far)?;
     // The cache fits all bounces, so its estimate is rendered with all.
     bench.begin("transport cache")?;
-    let gauge = Evaluator::new(subject, u32::MAX);
+    let gauge = Evaluator::new(&subject, u32::MAX);
     let cache: Vec<Mark> = (bench.seeds())
         .map(|seed| cached(bench, &gauge, &cache_settings(seed, bench.quick)))
         .collect::<Result<_>>()?;
 
-    let over_seconds = drawn("seconds", |mark| mark.seconds, (&kinds, batches), &cache);
+    let draw = |over| drawn(over, (&kinds, batches), &cache);
     let mark = common_mark(&kinds);
-    let common = mark.map_or(0.0, |mark| rays_when(&kinds, mark));
     Ok(Findings {
         how: format!(
             "The paper's descent on {}, {} seeds each, ADAM as published with nothing annealed and albedos and emissions \
@@ -92,28 +86,21 @@ fn run(bench: &Bench) -> Result<Findings> {
             comparison(bench.seeds),
         ),
         tables: vec![("", table("batch", &kinds, &cache))],
-        plots: vec![("", over_rays(&kinds, &cache)), ("-seconds", over_seconds)],
+        plots: vec![("", draw(RAYS)), ("-seconds", draw(SECONDS))],
         summary: summary(&kinds, mark),
-        seen: seen(&kinds, batches, &cache, mark, common, &limits.words()),
+        seen: seen(&kinds, batches, &cache, mark, &limits.words()),
         ..Findings::default()
     })
 }
 
 /// Plot of the batches with one sample per pixel.
-fn drawn(
-    label: &str,
-    x: fn(&Mark) -> f64,
-    (kinds, batches): (&[Kind], &[(u64, u64)]),
-    cache: &[Mark],
-) -> Plot {
+fn drawn(over: Over, (kinds, batches): (&[Kind], &[(u64, u64)]), cache: &[Mark]) -> Plot {
     // Only as many curves as have distinguishable colours.
     let drawn: Vec<Kind> = (kinds.iter().zip(batches))
         .filter(|(_, (batch, samples))| *samples == 1 && *batch != 2)
         .map(|(kind, _)| kind.clone())
         .collect();
-    let loss = |errors: &Errors| errors.loss;
-    let held_out = "held-out l1 loss, radiance";
-    plot("Batches", label, held_out, x, loss, &drawn, cache)
+    plot("Batches", over, LOSS, &drawn, cache)
 }
 
 fn name((batch, samples): (u64, u64)) -> String {
@@ -132,11 +119,10 @@ fn rays_when(kinds: &[Kind], mark: u32) -> f64 {
 
 fn summary(kinds: &[Kind], mark: Option<u32>) -> Summary {
     let row = |kind: &Kind| {
-        let equal = |quantity| mark.and_then(|mark| kind.at_mark(mark, quantity));
         vec![
             kind.name.clone(),
-            words(equal(|e: &Errors| e.loss)),
-            words(equal(|e: &Errors| e.albedo)),
+            words(kind.at_mark(mark, |e| e.loss)),
+            words(kind.at_mark(mark, |e| e.albedo)),
             words(kind.at_end(|e| e.loss)),
             words(kind.at_end(|e| e.albedo)),
             format!("{:.2}", kind.mean_end(|m| m.rays as f64) * 1e-6),
@@ -144,15 +130,8 @@ fn summary(kinds: &[Kind], mark: Option<u32>) -> Summary {
         ]
     };
     Summary {
-        columns: vec![
-            "batch",
-            "loss at equal rays",
-            "albedo error at equal rays",
-            "loss at the end",
-            "albedo error at the end",
-            "M rays at the end",
-            "steps",
-        ],
+        columns: "batch | loss at equal rays | albedo error at equal rays | loss at the end | albedo error at the end | \
+                  M rays at the end | steps",
         rows: kinds.iter().map(row).collect(),
     }
 }
@@ -162,13 +141,13 @@ fn seen(
     batches: &[(u64, u64)],
     cache: &[Mark],
     mark: Option<u32>,
-    common: f64,
     limit: &str,
 ) -> Vec<String> {
     let mut seen = Vec::new();
+    let common = mark.map_or(0.0, |mark| rays_when(kinds, mark));
     let rays = format!("At equal rays ({:.2} million)", common * 1e-6);
     let at_rays: Vec<Option<Spread>> = (kinds.iter())
-        .map(|kind| mark.and_then(|mark| kind.at_mark(mark, |e| e.loss)))
+        .map(|kind| kind.at_mark(mark, |e| e.loss))
         .collect();
     let at_end: Vec<Option<Spread>> = kinds.iter().map(|kind| kind.at_end(|e| e.loss)).collect();
     let end = format!("At the end ({limit} each)");

@@ -7,15 +7,15 @@ use crate::room::Room;
 use crate::room::photographs::Rendering;
 use crate::study::experiments::box_room;
 use crate::study::experiments::course::{
-    CACHE_WITHOUT, Evaluator, Mark, cache_settings, cached, descend, paper_settings, rays_at,
+    CACHE_WITHOUT, Evaluator, cache_settings, cached, descend, paper_settings, rays_at,
 };
 use crate::study::experiments::courses::{
-    Kind, Quantity, Spread, common_mark, comparison, plot, table, words,
+    ALBEDO, Kind, Quantity, RAYS, Shown, Spread, common_mark, comparison, plot, table, words,
 };
 use crate::study::experiments::findings::{Findings, Summary};
 use crate::study::experiments::study::{Bench, Study};
-use crate::study::experiments::subject::Subject;
 use crate::study::experiments::twin::{Sizes, twin};
+use crate::study::subject::Subject;
 
 /// The study.
 pub const STUDY: Study = Study {
@@ -39,8 +39,6 @@ const QUICK_ALBEDOS: &[(f64, &str)] = &[(0.8, "-paper-80")];
 const QUICK_DEPTHS: &[u64] = &[1, 2, 0];
 /// Where the adaptive depth is plotted.
 const CHOSEN_AT: f64 = 20.0;
-/// Half side of the lamp in metres.
-const LAMP: f64 = 0.25;
 /// An albedo error is too large if it exceeds this, ...
 const TOLERABLE: f64 = 0.01;
 /// ... and this factor times the error with adaptive depth.
@@ -58,6 +56,13 @@ struct TestRoom {
     paper: Vec<(u64, Kind)>,
 }
 
+impl TestRoom {
+    /// The last mark that all courses of the descent passed.
+    fn common_mark(&self) -> Option<u32> {
+        common_mark(self.paper.iter().map(|(_, kind)| kind))
+    }
+}
+
 fn run(bench: &Bench) -> Result<Findings> {
     let (albedos, depths) = match bench.quick {
         true => (QUICK_ALBEDOS, QUICK_DEPTHS),
@@ -72,14 +77,15 @@ fn run(bench: &Bench) -> Result<Findings> {
         Some(twin) => vec![("-paper", twin.room, twin.rendering)],
         None => (albedos.iter())
             .map(|&(albedo, file)| {
-                let room = box_room::box_room(&format!("mean albedo {albedo}"), albedo, LAMP);
+                let room =
+                    box_room::box_room(&format!("mean albedo {albedo}"), albedo, box_room::LAMP);
                 (file, room, box_room::rendering(bench.quick))
             })
             .collect(),
     };
     let limits = bench.limits(2 * rooms.len() * depths.len() * bench.seeds as usize);
     let mut scenes: Vec<TestRoom> = Vec::new();
-    for (file, room, rendering) in &rooms {
+    for (index, (file, room, rendering)) in rooms.iter().enumerate() {
         let subject = Subject::of_room(room, rendering)?;
         // The loss is measured with all bounces, whatever the fit has.
         let gauge = Evaluator::new(&subject, u32::MAX);
@@ -102,15 +108,12 @@ fn run(bench: &Bench) -> Result<Findings> {
                 courses,
             };
             let ends = bench.seeds().map(end).collect::<Result<_>>()?;
-            if let Some(scene) = scenes.last_mut() {
-                scene.cache.push((bounces, kind("transport cache", ends)));
-            }
-            (bench.show)(of_albedo(&scenes));
+            let cache = (bounces, kind("transport cache", ends));
+            scenes[index].cache.push(cache);
+            (bench.show)(over_depth(&scenes, ALBEDO));
             if bounces > 0 {
                 let courses = bench.seeds().map(course).collect();
-                if let Some(scene) = scenes.last_mut() {
-                    scene.paper.push((bounces, kind("paper", courses)));
-                }
+                scenes[index].paper.push((bounces, kind("paper", courses)));
             }
         }
     }
@@ -121,21 +124,16 @@ fn run(bench: &Bench) -> Result<Findings> {
         .map(|(_, kind)| kind.clone())
         .collect();
     let mut plots = vec![
-        ("", of_albedo(&scenes)),
+        ("", over_depth(&scenes, ALBEDO)),
         (
             "-emission",
-            over_depth(&scenes, "relative error of emission", |e| e.emission),
+            over_depth(&scenes, ("relative error of emission", |e| e.emission)),
         ),
     ];
     for scene in &scenes {
         let title = format!("Bounces of the paper's descent, {}", scene.name);
         let drawn: Vec<Kind> = scene.paper.iter().map(|(_, kind)| kind.clone()).collect();
-        let rays = |mark: &Mark| mark.rays as f64;
-        let label = "mean absolute error of albedo";
-        plots.push((
-            scene.file,
-            plot(&title, "rays", label, rays, |e| e.albedo, &drawn, &[]),
-        ));
+        plots.push((scene.file, plot(&title, RAYS, ALBEDO, &drawn, &[])));
     }
     Ok(Findings {
         how: format!(
@@ -147,7 +145,7 @@ fn run(bench: &Bench) -> Result<Findings> {
             limits.words(),
             comparison(bench.seeds),
         ),
-        tables: vec![("", table("room, solver, bounces", &kinds, &[]))],
+        tables: vec![("", table("\"room, solver, bounces\"", &kinds, &[]))],
         plots,
         summary: summary(&scenes),
         seen: seen(&scenes),
@@ -162,12 +160,8 @@ fn word(bounces: u64) -> String {
     }
 }
 
-fn of_albedo(scenes: &[TestRoom]) -> Plot {
-    over_depth(scenes, "mean absolute error of albedo", |e| e.albedo)
-}
-
 /// Error at the transport cache's end over the depth of its fit, one curve a room.
-fn over_depth(scenes: &[TestRoom], label: &str, quantity: Quantity) -> Plot {
+fn over_depth(scenes: &[TestRoom], (label, quantity): Shown) -> Plot {
     let curve = |scene: &TestRoom| {
         let mut series = Series {
             name: scene.name.clone(),
@@ -196,30 +190,14 @@ fn over_depth(scenes: &[TestRoom], label: &str, quantity: Quantity) -> Plot {
     }
 }
 
-/// Albedo errors of the descent by depth at the last mark that all courses passed, and that mark.
-fn at_equal_rays(scene: &TestRoom) -> (Option<u32>, Vec<(u64, Option<Spread>)>) {
-    let kinds = || scene.paper.iter().map(|(_, kind)| kind);
-    let mark = common_mark(kinds());
-    let error = |kind: &Kind| mark.and_then(|mark| kind.at_mark(mark, |e| e.albedo));
-    let errors = scene
-        .paper
-        .iter()
-        .map(|(depth, kind)| (*depth, error(kind)));
-    (mark, errors.collect())
-}
-
 fn summary(scenes: &[TestRoom]) -> Summary {
     let mut rows = Vec::new();
     for scene in scenes {
-        let mark = at_equal_rays(scene).0;
+        let mark = scene.common_mark();
         for (depth, kind) in &scene.cache {
             let paper = scene.paper.iter().find(|(other, _)| other == depth);
             let equal = |quantity: Quantity| {
-                words(
-                    paper
-                        .zip(mark)
-                        .and_then(|((_, k), m)| k.at_mark(m, quantity)),
-                )
+                words(paper.and_then(|(_, kind)| kind.at_mark(mark, quantity)))
             };
             rows.push(vec![
                 scene.name.clone(),
@@ -238,18 +216,8 @@ fn summary(scenes: &[TestRoom]) -> Summary {
         }
     }
     Summary {
-        columns: vec![
-            "room",
-            "bounces",
-            "cache: albedo error",
-            "emission error",
-            "loss",
-            "M rays",
-            "paper, equal rays: albedo error",
-            "emission error",
-            "loss",
-            "M rays",
-        ],
+        columns: "room | bounces | cache: albedo error | emission error | loss | M rays | \
+                  paper, equal rays: albedo error | emission error | loss | M rays",
         rows,
     }
 }
@@ -293,9 +261,9 @@ fn seen(scenes: &[TestRoom]) -> Vec<String> {
 
 /// Which depth is best for the descent, and which others do not differ beyond the noise.
 fn balance(scene: &TestRoom) -> Option<String> {
-    let (mark, errors) = at_equal_rays(scene);
-    let known: Vec<(u64, Spread)> = (errors.into_iter())
-        .filter_map(|(depth, error)| Some((depth, error?)))
+    let mark = scene.common_mark();
+    let known: Vec<(u64, Spread)> = (scene.paper.iter())
+        .filter_map(|(depth, kind)| Some((*depth, kind.at_mark(mark, |e| e.albedo)?)))
         .collect();
     let (best, lowest) = *known.iter().min_by(|a, b| a.1.mean.total_cmp(&b.1.mean))?;
     let (_, two) = known.iter().find(|(depth, _)| *depth == 2)?;
@@ -323,7 +291,7 @@ fn balance(scene: &TestRoom) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::experiments::course::Errors;
+    use crate::study::experiments::course::{Errors, Mark};
 
     /// A room in which the cache ends with these errors at one bounce, two bounces, and adaptive depth.
     fn room(errors: [f64; 3]) -> TestRoom {

@@ -7,10 +7,14 @@ use crate::room::cameras::View;
 use crate::room::photographs::Rendering;
 use crate::room::shape::Modeller;
 use crate::scene::geometry::Hit;
-use crate::study::experiments::subject::Subject;
+use crate::study::subject::Subject;
 use crate::transport::material::{Lobe, Material};
 use glam::{DVec3, Vec3};
 
+/// Mean albedo of [`standard`].
+pub const ALBEDO: f64 = 0.5;
+/// Half side of the lamp of [`standard`] in metres.
+pub const LAMP: f64 = 0.25;
 /// Random seed of the photographs; differs from those of solvers.
 pub const PHOTOGRAPH_SEED: u64 = 0x626f_7865_7300;
 /// Radiance times squared half side of the lamp, so that all lamps emit the same power.
@@ -36,6 +40,11 @@ const BOARD_VIEWS: [[[f64; 3]; 2]; 2] = [
     [[0.8, 1.5, -0.8], [0.1, 1.0, -0.1]],
     [[-0.7, 1.7, 0.5], [0.2, 1.0, -0.2]],
 ];
+
+/// The box room of the studies of one room.
+pub fn standard() -> Room {
+    box_room("box room", ALBEDO, LAMP)
+}
 
 /// A box of 2 m with six coloured sides, a block, and a black square lamp of half side `lamp` below the ceiling. The
 /// mean albedo of the seven reflectors is `albedo` in each channel.
@@ -114,12 +123,7 @@ pub fn board_room(name: &str, albedo: f64, lamp: f64, lobe: Lobe) -> Room {
 
 /// A room's true values, for materials of constant albedo.
 pub fn truth(room: &Room) -> Unknowns {
-    let anywhere = Hit {
-        t: 0.0,
-        triangle: 0,
-        b1: 0.0,
-        b2: 0.0,
-    };
+    let anywhere = Hit::default();
     let materials = || room.materials.iter();
     Unknowns {
         albedo: materials().map(|m| m.albedo_at(&anywhere)).collect(),
@@ -127,20 +131,9 @@ pub fn truth(room: &Room) -> Unknowns {
     }
 }
 
-/// The box room with photographs, as by [`photograph`].
-///
-/// # Errors
-/// Never for a lamp that fits below the ceiling.
-pub fn photographed(name: &str, albedo: f64, lamp: f64, quick: bool) -> Result<Subject> {
-    photograph(&box_room(name, albedo, lamp), quick)
-}
-
-/// A room with photographs of all bounces, rendered as by [`rendering`].
-///
-/// # Errors
-/// The room's mesh is empty.
-pub fn photograph(room: &Room, quick: bool) -> Result<Subject> {
-    Subject::of_room(room, &rendering(quick))
+/// The [`standard`] room with photographs of all bounces, rendered as by [`rendering`].
+pub fn photographed(quick: bool) -> Result<Subject> {
+    Subject::of_room(&standard(), &rendering(quick))
 }
 
 /// Settings of these rooms' photographs; smaller and noisier if `quick`.
@@ -166,14 +159,7 @@ mod tests {
         for albedo in [0.3, 0.95] {
             let room = box_room("room", albedo, 0.25);
             let world = room.lit([16, 12]).expect("a scene");
-            let reflectors = &room.materials[..DEVIATIONS.len()];
-            let hit = crate::scene::geometry::Hit {
-                t: 0.0,
-                triangle: 0,
-                b1: 0.3,
-                b2: 0.3,
-            };
-            let sum: Vec3 = reflectors.iter().map(|m| m.albedo_at(&hit)).sum();
+            let sum: Vec3 = truth(&room).albedo[..DEVIATIONS.len()].iter().sum();
             let mean = sum / DEVIATIONS.len() as f32;
             assert!((mean - albedo as f32).abs().max_element() < 1e-5, "{mean}");
             let seen = crate::room::truth::seen_pixels(&world);

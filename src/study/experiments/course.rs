@@ -1,7 +1,6 @@
 //! Courses of solves that studies compare: the paper's descent, measured at fixed numbers of rays, and the end of the transport
 //! cache.
 
-use crate::calibrate::problem::Problem;
 use crate::error::Result;
 use crate::inverse::estimate::{Estimate, ObjectEstimate};
 use crate::inverse::loss::LossProbe;
@@ -9,7 +8,7 @@ use crate::inverse::paper::descent::{Descent, StepOutcome};
 use crate::inverse::settings::{Preset, Settings};
 use crate::inverse::solver::Solution;
 use crate::study::experiments::study::{Bench, Limits};
-use crate::study::experiments::subject::Subject;
+use crate::study::subject::Subject;
 use crate::study::trade::plan::Run;
 use crate::study::trade::watch;
 use crate::transport::material::Lobe;
@@ -56,10 +55,14 @@ pub struct Errors {
 
 /// Measures estimates of a subject, always on the same pixels.
 pub struct Evaluator<'a> {
-    subject: &'a Subject,
-    probe: LossProbe,
-    watched: Option<&'a str>,
-    lobes: Vec<Option<Lobe>>,
+    /// What is solved.
+    pub subject: &'a Subject,
+    /// Measures the loss.
+    pub probe: LossProbe,
+    /// The object whose error is told by itself.
+    pub watched: Option<&'a str>,
+    /// The objects' lobes, where descents know them.
+    pub lobes: Vec<Option<Lobe>>,
 }
 
 impl<'a> Evaluator<'a> {
@@ -75,23 +78,6 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    /// The same for descents that know the objects' lobes.
-    pub fn with_lobes(mut self, lobes: Vec<Option<Lobe>>) -> Self {
-        self.lobes = lobes;
-        self
-    }
-
-    /// The same with an object to watch.
-    pub fn watch_object(mut self, object: &'a str) -> Self {
-        self.watched = Some(object);
-        self
-    }
-
-    /// The problem to solve.
-    pub fn problem(&self) -> &'a Problem {
-        &self.subject.problem
-    }
-
     /// Measures an estimate.
     pub fn errors(&self, estimate: &Estimate) -> Errors {
         let known =
@@ -101,10 +87,8 @@ impl<'a> Evaluator<'a> {
             albedo: known.as_ref().and_then(|known| known.albedo_mae),
             object: known.as_ref().and_then(|known| {
                 let mut objects = known.per_object.iter();
-                objects
-                    .find(|(name, _)| Some(name.as_str()) == self.watched)?
-                    .1
-                    .albedo_rel
+                let watched = objects.find(|(name, _)| Some(name.as_str()) == self.watched);
+                watched?.1.albedo_rel
             }),
             emission: known.and_then(|known| known.emission_rel_median),
         }

@@ -31,13 +31,25 @@ pub struct Spread {
 /// Selects an error.
 pub type Quantity = fn(&Errors) -> Option<f64>;
 
+/// Label of a plot's horizontal axis, and what it shows of a mark.
+pub type Over = (&'static str, fn(&Mark) -> f64);
+/// Rays cast by the solve.
+pub const RAYS: Over = ("rays", |mark| mark.rays as f64);
+/// Seconds of solving.
+pub const SECONDS: Over = ("seconds", |mark| mark.seconds);
+
+/// Label of a plot's vertical axis, and the error that it shows.
+pub type Shown = (&'static str, Quantity);
+/// The loss on held-out pixels.
+pub const LOSS: Shown = ("held-out l1 loss, radiance", |errors| errors.loss);
+/// The error of albedo.
+pub const ALBEDO: Shown = ("mean absolute error of albedo", |errors| errors.albedo);
+
 impl Spread {
     /// Over positive values; `None` without any.
     pub fn over(values: impl Iterator<Item = f64>) -> Option<Self> {
-        let mut moments = Moments::default();
-        values
-            .filter(|value| value.is_finite() && *value > 0.0)
-            .for_each(|value| moments.push(value.ln()));
+        let known = values.filter(|value| value.is_finite() && *value > 0.0);
+        let moments: Moments = known.map(f64::ln).collect();
         (moments.count > 0).then(|| Self {
             mean: moments.mean.exp(),
             factor: moments.variance().sqrt().exp(),
@@ -97,16 +109,13 @@ pub fn run(
 ) -> Result<Vec<Kind>> {
     let mut kinds: Vec<Kind> = Vec::new();
     for (index, name) in names.into_iter().enumerate() {
-        let mut courses = Vec::new();
+        kinds.push(Kind {
+            name: name.clone(),
+            courses: Vec::new(),
+        });
         for seed in bench.seeds() {
             bench.begin(&format!("{name}, seed {seed}"))?;
-            courses.push(course(index, seed));
-            let kind = Kind {
-                name: name.clone(),
-                courses: courses.clone(),
-            };
-            kinds.truncate(index);
-            kinds.push(kind);
+            kinds[index].courses.push(course(index, seed));
             (bench.show)(plot(&kinds));
         }
     }
@@ -123,10 +132,11 @@ pub fn common_mark<'a>(kinds: impl IntoIterator<Item = &'a Kind>) -> Option<u32>
 }
 
 impl Kind {
-    /// An error over seeds at a mark.
-    pub fn at_mark(&self, mark: u32, quantity: Quantity) -> Option<Spread> {
+    /// An error over seeds at a mark; `None` without a mark.
+    pub fn at_mark(&self, mark: Option<u32>, quantity: Quantity) -> Option<Spread> {
+        let mark = Some(mark?);
         let values = self.courses.iter().filter_map(|course| {
-            let passed = course.iter().find(|m| m.index >= Some(mark))?;
+            let passed = course.iter().find(|m| m.index >= mark)?;
             quantity(&passed.errors)
         });
         Spread::over(values)
@@ -152,14 +162,12 @@ impl Kind {
             ..Series::default()
         };
         for index in 0..=last.unwrap_or(0) {
-            let here = || {
-                let at =
-                    |course: &'_ Vec<Mark>| course.iter().find(|m| m.index == Some(index)).cloned();
-                self.courses.iter().filter_map(at)
-            };
-            if let Some(spread) = Spread::over(here().filter_map(|mark| quantity(&mark.errors))) {
-                let places = here().map(|mark| x(&mark));
-                let place = places.sum::<f64>() / here().count().max(1) as f64;
+            let here: Vec<&Mark> = (self.courses.iter())
+                .filter_map(|course| course.iter().find(|m| m.index == Some(index)))
+                .collect();
+            let errors = here.iter().filter_map(|mark| quantity(&mark.errors));
+            if let Some(spread) = Spread::over(errors) {
+                let place = here.iter().map(|mark| x(mark)).sum::<f64>() / here.len() as f64;
                 series.points.push([place, spread.mean]);
                 series.band.push(spread.band());
             }
@@ -171,10 +179,8 @@ impl Kind {
 /// A plot of mean courses over rays or seconds, with the transport cache's ends as dots.
 pub fn plot(
     title: &str,
-    x_label: &str,
-    y_label: &str,
-    x: fn(&Mark) -> f64,
-    quantity: Quantity,
+    (x_label, x): Over,
+    (y_label, quantity): Shown,
     kinds: &[Kind],
     cache: &[Mark],
 ) -> Plot {
@@ -186,34 +192,23 @@ pub fn plot(
     // A ring without a label; the legend names it.
     let labels = ends.iter().map(|&end| (end, String::new())).collect();
     series.push(Series {
-        name: "transport cache, ends".to_owned(),
-        points: ends,
-        band: Vec::new(),
         draw: Draw::Dots,
+        ..Series::line("transport cache, ends", ends)
     });
     Plot {
         title: title.to_owned(),
         x: Axis::logarithmic(x_label),
         y: Axis::logarithmic(y_label),
         series,
-        marks: Vec::new(),
         labels,
+        ..Plot::default()
     }
 }
 
 /// All marks of all courses and the transport cache's ends, a row each.
-pub fn table(axis: &'static str, kinds: &[Kind], cache: &[Mark]) -> Table {
-    let mut table = Table::new(&[
-        axis,
-        "seed",
-        "mark",
-        "rays",
-        "seconds",
-        "steps",
-        "loss",
-        "albedo_error",
-        "emission_error",
-    ]);
+pub fn table(axis: &str, kinds: &[Kind], cache: &[Mark]) -> Table {
+    let columns = "seed,mark,rays,seconds,steps,loss,albedo_error,emission_error";
+    let mut table = Table::new(&format!("{axis},{columns}"));
     let mut add = |name: &str, seed: usize, mark: &Mark| {
         table.row(&[
             name.into(),

@@ -5,7 +5,7 @@ use crate::export::plot::{Axis, Plot, Series};
 use crate::export::table::Table;
 use crate::math::color::luminance_f64;
 use crate::math::rng::Stream;
-use crate::math::stats::Moments;
+use crate::math::stats::{Moments, weighted_median};
 use crate::room::photographs::Rendering;
 use crate::scene::visibility::NOTHING;
 use crate::study::experiments::box_room;
@@ -14,7 +14,7 @@ use crate::study::experiments::study::{Bench, Study};
 use crate::study::experiments::twin::studied;
 use crate::transport::lit::LitScene;
 use crate::transport::path::{PathOptions, radiance};
-use glam::{DVec3, Vec2};
+use glam::DVec3;
 use rayon::prelude::*;
 
 /// The study.
@@ -31,10 +31,6 @@ const SAMPLES: &[u32] = &[1, 2, 4, 8, 16, 32, 64];
 const QUICK_SAMPLES: &[u32] = &[1, 4, 16];
 /// First key of the samples, for the photographs and the fits.
 const KEY: u64 = 0x6573_7469;
-/// Mean albedo.
-const ALBEDO: f64 = 0.5;
-/// Half side of the lamp in metres.
-const LAMP: f64 = 0.25;
 /// Most pixels that are rendered; the box room's photographs have fewer.
 const MAX_PIXELS: usize = 12_000;
 /// Largest bias that counts as none.
@@ -68,110 +64,104 @@ struct Pixel {
     render: [f64; 2],
 }
 
-/// One fit of the light's scale; the true value is 1.
-struct EstimatorFit {
-    estimator: usize,
+/// Fits of the light's scale to renders of one number of samples; the true value is 1.
+struct Fits {
     samples: u32,
-    seed: u64,
-    scale: f64,
+    /// For each seed, from 1: the scale by each estimator.
+    scales: Vec<[f64; ESTIMATORS.len()]>,
+    /// Mean of the expected l2 fits with the same samples.
+    predicted: f64,
+}
+
+impl Fits {
+    /// Mean and spread over seeds, without fits that have no finite root.
+    fn mean(&self, estimator: usize) -> Moments {
+        let scales = self.scales.iter().map(|scales| scales[estimator]);
+        scales.filter(|scale| scale.is_finite()).collect()
+    }
+
+    /// The mean as text.
+    fn value(&self, estimator: usize) -> String {
+        let (fits, seeds) = (self.mean(estimator), self.scales.len() as u64);
+        match fits.count {
+            0 => "no finite root".to_owned(),
+            all if all == seeds => format!("{:.4}", fits.mean),
+            some => format!(
+                "{:.4} ({some} of {seeds} seeds have a finite root)",
+                fits.mean
+            ),
+        }
+    }
 }
 
 fn run(bench: &Bench) -> Result<Findings> {
-    let words = format!("A box room of mean albedo {ALBEDO}");
     let (size, reference, samples) = match bench.quick {
         true => ([24, 18], 256, QUICK_SAMPLES),
         false => ([48, 36], 1024, SAMPLES),
     };
-    let own_room = || {
-        let room = box_room::box_room("box room", ALBEDO, LAMP);
-        let rendering = box_room::rendering(bench.quick);
-        (room, Rendering { size, ..rendering })
+    let rendering = Rendering {
+        size,
+        ..box_room::rendering(bench.quick)
     };
-    let studied = studied(bench, &words, own_room)?;
+    let studied = studied(bench, rendering)?;
     let lit = studied.room.lit(studied.rendering.size)?;
 
-    // BSDF sampling alone is noisy, like light through a door; MIS is not.
-    let options =
-        [("BSDF sampling", false), ("both (MIS)", true)].map(|(name, sample_emitters)| {
-            let options = PathOptions {
-                sample_emitters,
-                ..PathOptions::default()
-            };
-            (name, options)
-        });
+    let options = |sample_emitters| PathOptions {
+        sample_emitters,
+        ..PathOptions::default()
+    };
     bench.begin("photographs")?;
-    let photographs = render(&lit, &options[1].1, [KEY, 0], reference);
-    let mut table = Table::new(&[
-        "sampling",
-        "estimator",
-        "samples",
-        "seed",
-        "scale",
-        "predicted",
-    ]);
+    let photographs = render(&lit, &options(true), [KEY, 0], reference);
+    let mut table = Table::new("sampling,estimator,samples,seed,scale,predicted");
     let mut plots = Vec::new();
     let mut summary = Summary {
-        columns: vec![
-            "sampling",
-            "samples a pixel",
-            ESTIMATORS[0].0,
-            ESTIMATORS[1].0,
-            ESTIMATORS[2].0,
-            "l2 same, predicted",
-            ESTIMATORS[3].0,
-        ],
+        columns: "sampling | samples a pixel | l1, same samples | l1, independent samples | l2, same samples | \
+                  l2 same, predicted | l2, two sets",
         rows: Vec::new(),
     };
     let mut seen = Vec::new();
-    for ((name, options), suffix) in options.iter().zip(["", "-mis"]) {
-        let mut fits: Vec<EstimatorFit> = Vec::new();
-        let mut predictions = Vec::new();
-        for (index, &count) in samples.iter().enumerate() {
+    // BSDF sampling alone is noisy, like light through a door; MIS is not.
+    for (name, suffix, options) in [
+        ("BSDF sampling", "", options(false)),
+        ("both (MIS)", "-mis", options(true)),
+    ] {
+        let mut fits: Vec<Fits> = Vec::new();
+        for &count in samples {
             bench.begin(&format!("{name}, {count} samples a pixel"))?;
-            let mut predicted = Moments::default();
+            let (mut scales, mut predicted) = (Vec::new(), Moments::default());
             for seed in bench.seeds() {
-                let sets = [1, 2].map(|set| render(&lit, options, [KEY + seed, set], count));
+                let sets = [1, 2].map(|set| render(&lit, &options, [KEY + seed, set], count));
                 let pixels = pixels(&photographs, &sets);
                 predicted.push(same_samples_predicted(&pixels));
-                let each = ESTIMATORS.iter().enumerate();
-                fits.extend(each.map(|(estimator, (_, fit))| EstimatorFit {
-                    estimator,
-                    samples: count,
-                    seed,
-                    scale: fit(&pixels),
-                }));
+                scales.push(ESTIMATORS.map(|(_, fit)| fit(&pixels)));
             }
-            predictions.push(predicted.mean);
-            let so_far = |estimator: usize, samples: u32| mean(&fits, estimator, samples);
-            (bench.show)(plot(name, &samples[..=index], &so_far, &predictions));
+            fits.push(Fits {
+                samples: count,
+                scales,
+                predicted: predicted.mean,
+            });
+            (bench.show)(plot(name, &fits));
         }
-        for fit in &fits {
-            let place = samples.iter().position(|&n| n == fit.samples);
-            let prediction = place.filter(|_| fit.estimator == 2).map(|i| predictions[i]);
-            table.row(&[
-                (*name).into(),
-                ESTIMATORS[fit.estimator].0.into(),
-                u64::from(fit.samples).into(),
-                fit.seed.into(),
-                fit.scale.into(),
-                prediction.into(),
-            ]);
+        for at in &fits {
+            for (seed, scales) in (1u64..).zip(&at.scales) {
+                for (index, (estimator, _)) in ESTIMATORS.iter().enumerate() {
+                    table.row(&[
+                        name.into(),
+                        (*estimator).into(),
+                        u64::from(at.samples).into(),
+                        seed.into(),
+                        scales[index].into(),
+                        (index == 2).then_some(at.predicted).into(),
+                    ]);
+                }
+            }
+            let [a, b, c, d] = [0, 1, 2, 3].map(|estimator| at.value(estimator));
+            let predicted = format!("{:.4}", at.predicted);
+            let name = name.to_owned();
+            (summary.rows).push(vec![name, at.samples.to_string(), a, b, c, predicted, d]);
         }
-        let mean = |estimator: usize, samples: u32| mean(&fits, estimator, samples);
-        for (&count, prediction) in samples.iter().zip(&predictions) {
-            let value = |estimator| value(&mean(estimator, count), bench.seeds);
-            summary.rows.push(vec![
-                (*name).to_owned(),
-                count.to_string(),
-                value(0),
-                value(1),
-                value(2),
-                format!("{prediction:.4}"),
-                value(3),
-            ]);
-        }
-        plots.push((suffix, plot(name, samples, &mean, &predictions)));
-        seen.extend(sentences(name, samples, &mean, bench.seeds));
+        plots.push((suffix, plot(name, &fits)));
+        seen.extend(sentences(name, &fits));
     }
     Ok(Findings {
         how: format!(
@@ -209,14 +199,12 @@ fn render(lit: &LitScene, options: &PathOptions, [seed, set]: [u64; 2], samples:
         .map(|index| {
             let (frame, pixel) = pixels[index * pixels.len() / count];
             let camera = &scene.cameras[frame];
-            let width = camera.intrinsics.width as usize;
-            let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
+            // Through the pixel's centre, so that only the light is noisy.
+            let ray = camera.ray(camera.corner(pixel) + 0.5);
             let mut sum = DVec3::ZERO;
             for sample in 0..samples {
                 let key = (set << 32) + u64::from(sample);
                 let mut stream = Stream::new(seed, frame as u64, pixel as u64, key);
-                // Through the pixel's centre, so that only the light is noisy.
-                let ray = camera.ray(corner + 0.5);
                 sum += radiance(lit, &ray, &mut stream, options)
                     .radiance
                     .as_dvec3();
@@ -243,19 +231,12 @@ fn ratio(pixels: &[Pixel], over: impl Fn(&Pixel) -> f64, under: impl Fn(&Pixel) 
 /// The root θ of Σ sign(θ·x − y)·w, with a pixel's first render x, photograph y and derivative w: the median of y / x
 /// weighted by w. Where x = 0 the sign is negative for every θ.
 fn l1(pixels: &[Pixel], weight: impl Fn(&Pixel) -> f64) -> f64 {
-    let mut roots: Vec<(f64, f64)> = pixels
+    let roots = pixels
         .iter()
         .map(|p| (p.photograph / p.render[0].max(0.0), weight(p)))
         .filter(|(root, weight)| !root.is_nan() && *weight > 0.0)
         .collect();
-    roots.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let half = 0.5 * roots.iter().map(|(_, weight)| weight).sum::<f64>();
-    let mut below = 0.0;
-    let median = roots.iter().find(|(_, weight)| {
-        below += weight;
-        below >= half
-    });
-    median.map_or(f64::NAN, |(root, _)| *root)
+    weighted_median(roots).unwrap_or(f64::NAN)
 }
 
 /// Expected l2 fit with the same samples: Σ x² / Σ (x² + σ²), where the variance σ² of a render is estimated from the
@@ -269,44 +250,23 @@ fn same_samples_predicted(pixels: &[Pixel]) -> f64 {
     )
 }
 
-/// Mean and spread of a fit over seeds, without fits that have no finite root.
-fn mean(fits: &[EstimatorFit], estimator: usize, samples: u32) -> Moments {
-    let mut moments = Moments::default();
-    (fits.iter())
-        .filter(|fit| fit.estimator == estimator && fit.samples == samples)
-        .filter(|fit| fit.scale.is_finite())
-        .for_each(|fit| moments.push(fit.scale));
-    moments
-}
-
-fn plot(
-    name: &str,
-    samples: &[u32],
-    mean: &dyn Fn(usize, u32) -> Moments,
-    predictions: &[f64],
-) -> Plot {
+fn plot(name: &str, fits: &[Fits]) -> Plot {
     let mut series: Vec<Series> = Vec::new();
     for (estimator, (name, _)) in ESTIMATORS.iter().enumerate() {
-        let known: Vec<(f64, Moments)> = (samples.iter())
-            .map(|&n| (f64::from(n), mean(estimator, n)))
+        let known: Vec<(f64, Moments)> = (fits.iter())
+            .map(|at| (f64::from(at.samples), at.mean(estimator)))
             .filter(|(_, moments)| moments.count > 0)
             .collect();
         let deviation = |m: &Moments| m.variance().sqrt();
         series.push(Series {
-            name: (*name).to_owned(),
-            points: known.iter().map(|(n, m)| [*n, m.mean]).collect(),
             band: (known.iter())
                 .map(|(_, m)| [m.mean - deviation(m), m.mean + deviation(m)])
                 .collect(),
-            ..Series::default()
+            ..Series::line(*name, known.iter().map(|(n, m)| [*n, m.mean]))
         });
     }
-    let predicted = samples.iter().zip(predictions);
-    series.push(Series {
-        name: "l2, same samples: predicted".to_owned(),
-        points: predicted.map(|(&n, &p)| [f64::from(n), p]).collect(),
-        ..Series::default()
-    });
+    let predicted = fits.iter().map(|at| [f64::from(at.samples), at.predicted]);
+    series.push(Series::line("l2, same samples: predicted", predicted));
     Plot {
         title: format!("Fitted brightness of a lamp, paths by {name}"),
         x: Axis::logarithmic("samples a pixel"),
@@ -316,63 +276,48 @@ fn plot(
     }
 }
 
-/// A fit as text, out of `seeds` attempts.
-fn value(fits: &Moments, seeds: u64) -> String {
-    match fits.count {
-        0 => "no finite root".to_owned(),
-        all if all == seeds => format!("{:.4}", fits.mean),
-        some => format!(
-            "{:.4} ({some} of {seeds} seeds have a finite root)",
-            fits.mean
-        ),
-    }
-}
-
-fn sentences(
-    name: &str,
-    samples: &[u32],
-    mean: &dyn Fn(usize, u32) -> Moments,
-    seeds: u64,
-) -> Vec<String> {
-    let (Some(&few), Some(&many)) = (samples.first(), samples.last()) else {
+fn sentences(name: &str, fits: &[Fits]) -> Vec<String> {
+    let (Some(few), Some(many)) = (fits.first(), fits.last()) else {
         return Vec::new();
     };
-    let value = |estimator, samples: u32| value(&mean(estimator, samples), seeds);
     let mut seen = vec![format!(
-        "{name}, {few} sample(s) a pixel: l1 with the same samples fits {}, l1 with independent samples {}, l2 with the \
-         same samples {}, l2 with two sets {}; with {many}: {}, {}, {}, {}.",
-        value(0, few),
-        value(1, few),
-        value(2, few),
-        value(3, few),
-        value(0, many),
-        value(1, many),
-        value(2, many),
-        value(3, many),
+        "{name}, {} sample(s) a pixel: l1 with the same samples fits {}, l1 with independent samples {}, l2 with the \
+         same samples {}, l2 with two sets {}; with {}: {}, {}, {}, {}.",
+        few.samples,
+        few.value(0),
+        few.value(1),
+        few.value(2),
+        few.value(3),
+        many.samples,
+        many.value(0),
+        many.value(1),
+        many.value(2),
+        many.value(3),
     )];
-    let biased = |estimator: usize| {
-        let n: Vec<String> = (samples.iter())
-            .filter(|&&n| {
-                let moments = mean(estimator, n);
-                let bias = (moments.mean - 1.0).abs();
-                moments.count < seeds || bias > SMALL.max(3.0 * moments.standard_error())
-            })
-            .map(u32::to_string)
-            .collect();
-        match n.is_empty() {
-            true => "none".to_owned(),
-            false => n.join(", "),
-        }
-    };
+    let seeds = few.scales.len() as u64;
     // The noise of a single seed is unknown.
     if seeds < 2 {
         return seen;
     }
-    let tried: Vec<String> = samples.iter().map(u32::to_string).collect();
+    let listed = |tried: &mut dyn Iterator<Item = &Fits>| -> String {
+        let tried: Vec<String> = tried.map(|at| at.samples.to_string()).collect();
+        tried.join(", ")
+    };
+    let biased = |estimator: usize| {
+        let found = listed(&mut fits.iter().filter(|at| {
+            let moments = at.mean(estimator);
+            let bias = (moments.mean - 1.0).abs();
+            moments.count < seeds || bias > SMALL.max(3.0 * moments.standard_error())
+        }));
+        match found.is_empty() {
+            true => "none".to_owned(),
+            false => found,
+        }
+    };
     seen.push(format!(
         "{name}: numbers of samples, of {}, at which the fit is off by more than {} % and three standard errors, or a seed has \
          no finite root: l1 with independent samples, the paper's way, {}; l2 with two sets {}.",
-        tried.join(", "),
+        listed(&mut fits.iter()),
         brief(SMALL * 100.0),
         biased(1),
         biased(3),

@@ -9,7 +9,6 @@ use crate::math::rng::Stream;
 use crate::math::sequence::{SequencePoint, Uniforms};
 use crate::math::stats::Moments;
 use crate::study::experiments::gradient::{lamps, tracer};
-use glam::Vec2;
 use rayon::prelude::*;
 
 /// First key of the random numbers.
@@ -37,29 +36,21 @@ pub fn measure(problem: &Problem, truth: &Unknowns, pixels: usize, max: u64) -> 
         .map(|k| 4u64.pow(k))
         .take_while(|&n| n <= max)
         .collect();
-    let all: Vec<(usize, u32)> = (problem.photographs.iter().enumerate())
-        .flat_map(|(frame, p)| (0..p.pixels.len() as u32).map(move |pixel| (frame, pixel)))
+    let all: Vec<(usize, usize)> = (problem.photographs.iter().enumerate())
+        .flat_map(|(frame, p)| (0..p.pixels.len()).map(move |pixel| (frame, pixel)))
         .collect();
     let squares: Vec<[Vec<f64>; 2]> = (0..pixels)
         .into_par_iter()
         .map(|index| {
             let (frame, pixel) = all[(2 * index + 1) * all.len() / (2 * pixels)];
-            let key = |repetition: u64| [frame as u64, u64::from(pixel), repetition];
-            let random = |[frame, pixel, repetition]: [u64; 3], index| {
-                Stream::new(KEY + repetition, frame, pixel, index)
-            };
-            let sequence = |key, index| SequencePoint::new(KEY, key, index);
-            let at = |counts: &[u64]| {
-                [
-                    variances(problem, truth, (frame, pixel), counts, |r, i| {
-                        random(key(r), i)
-                    }),
-                    variances(problem, truth, (frame, pixel), counts, |r, i| {
-                        sequence(key(r), i)
-                    }),
-                ]
-            };
-            at(&counts)
+            let at = [frame as u64, pixel as u64];
+            let random = |repetition, index| Stream::new(KEY + repetition, at[0], at[1], index);
+            let sequence =
+                |repetition, index| SequencePoint::new(KEY, [at[0], at[1], repetition], index);
+            [
+                variances(problem, truth, (frame, pixel), &counts, random),
+                variances(problem, truth, (frame, pixel), &counts, sequence),
+            ]
         })
         .collect();
     (counts.iter().enumerate())
@@ -83,7 +74,7 @@ pub fn measure(problem: &Problem, truth: &Unknowns, pixels: usize, max: u64) -> 
 fn variances<U: Uniforms>(
     problem: &Problem,
     truth: &Unknowns,
-    (frame, pixel): (usize, u32),
+    (frame, pixel): (usize, usize),
     counts: &[u64],
     numbers: impl Fn(u64, u64) -> U,
 ) -> Vec<f64> {
@@ -91,8 +82,7 @@ fn variances<U: Uniforms>(
     let lights = lamps(scene, &truth.emission);
     let believed: Vec<f32> = truth.albedo.iter().map(|a| a.max_element()).collect();
     let tracer = tracer(scene, &lights, &believed, LightSampling::Mis, BOUNCES);
-    let width = problem.photographs[frame].width;
-    let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
+    let camera = &scene.cameras[frame];
     let (mut vertices, mut gathered) = (Vec::new(), Vec::new());
     let mut gradient = Gradient::new(2 * truth.surfaces());
     let mut means = vec![Moments::default(); counts.len()];
@@ -103,7 +93,7 @@ fn variances<U: Uniforms>(
                 vertices.clear();
                 gradient.clear();
                 let mut numbers = numbers(repetition, next);
-                tracer.pixel_path(&scene.cameras[frame], corner, &mut numbers, &mut vertices);
+                tracer.pixel_path(camera, camera.corner(pixel), &mut numbers, &mut vertices);
                 let radiance = differentiate(&vertices, truth, &[], &mut gathered, &mut gradient);
                 sum += f64::from(luminance(radiance));
                 next += 1;

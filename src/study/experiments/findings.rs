@@ -37,15 +37,6 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// An empty grid.
-    pub fn new(columns: usize) -> Self {
-        Self {
-            columns,
-            exposure: 1.0,
-            pictures: Vec::new(),
-        }
-    }
-
     /// Writes the grid as a PNG.
     ///
     /// # Errors
@@ -64,8 +55,8 @@ impl Grid {
 /// A small table of text.
 #[derive(Debug, Clone, Default)]
 pub struct Summary {
-    /// Column titles.
-    pub columns: Vec<&'static str>,
+    /// Column titles, with ` | ` between them.
+    pub columns: &'static str,
     /// Rows, one text for each column.
     pub rows: Vec<Vec<String>>,
 }
@@ -73,11 +64,10 @@ pub struct Summary {
 impl Summary {
     /// The table in Markdown.
     pub fn markdown(&self) -> String {
-        let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
-        let head: Vec<String> = self.columns.iter().map(|&c| c.to_owned()).collect();
-        let rule = vec!["---".to_owned(); head.len()];
-        let rows: String = self.rows.iter().map(|row| line(row)).collect();
-        line(&head) + &line(&rule) + &rows
+        let line = |cells: &str| format!("| {cells} |\n");
+        let rule = vec!["---"; self.columns.split(" | ").count()];
+        let rows: String = self.rows.iter().map(|row| line(&row.join(" | "))).collect();
+        line(self.columns) + &line(&rule.join(" | ")) + &rows
     }
 }
 

@@ -1,6 +1,5 @@
 //! A room with and without two chairs: the built-in room, or the twin of a capture.
 
-use crate::capture::mesh::Mesh;
 use crate::capture::photograph::Photograph;
 use crate::compose::object::ObjectModel;
 use crate::compose::placement::Placement;
@@ -10,12 +9,12 @@ use crate::room::photographs::{Rendering, STORED, render, stored};
 use crate::room::shape::Modeller;
 use crate::scene::visibility::NOTHING;
 use crate::study::experiments::chair::chair;
-use crate::study::experiments::standing::{Cylinder, places, up};
-use crate::study::experiments::subject::Subject;
+use crate::study::experiments::standing::{Cylinder, places, up, upright};
 use crate::study::experiments::twin::Studied;
+use crate::study::subject::Subject;
 use crate::transport::lit::LitScene;
 use crate::transport::material::{Albedo, Material};
-use glam::{DAffine3, DQuat, DVec3, Vec3};
+use glam::{DAffine3, DVec3, Vec3};
 use std::cmp::Reverse;
 use std::sync::Arc;
 
@@ -130,12 +129,11 @@ pub fn of_twin(twin: Studied) -> Result<Furnished> {
             "run the study on rooms of its own",
         )
     })?;
-    let up = up.as_dvec3().normalize_or(DVec3::Y);
-    let upright = DAffine3::from_quat(DQuat::from_rotation_arc(DVec3::Y, up));
+    let upwards = up.as_dvec3().normalize_or(DVec3::Y);
     let stand = |index: usize| {
-        let at = places[index].as_dvec3() + scene.origin + up * (LIFT * height);
+        let at = places[index].as_dvec3() + scene.origin + upwards * (LIFT * height);
         DAffine3::from_translation(at)
-            * upright
+            * upright(up)
             * DAffine3::from_rotation_y(CHAIRS[index].3)
             * DAffine3::from_scale(DVec3::splat(height / HEIGHT))
     };
@@ -184,17 +182,27 @@ fn furnish(
     let size = photographs.first().map_or([0; 2], |p| [p.width, p.height]);
     let subject = Subject::of_photographs(&room, photographs)?;
     let lit = room.lit(size)?;
-    let chairs = chairs(stands);
-    let material = |color: [f32; 3]| Material::diffuse(color.into(), Vec3::ZERO);
-    let models = (CHAIRS.iter().enumerate())
-        .map(|(index, (name, color, ..))| {
-            let corners = corners_of(&chairs, index as u32);
-            ObjectModel::from_corners(name, corners, material(*color)).map(Arc::new)
-        })
-        .collect::<Result<_>>()?;
-    let colors = CHAIRS.iter().map(|(_, color, ..)| material(*color));
-    room.materials.extend(colors);
-    append(&mut room.mesh, chairs);
+    let is_textured = !room.mesh.corner_uvs.is_empty();
+    let mut modeller = Modeller {
+        mesh: room.mesh,
+        ..Modeller::default()
+    };
+    let mut models = Vec::new();
+    for ((name, color, ..), stand) in CHAIRS.into_iter().zip(stands) {
+        let first = modeller.mesh.triangles.len();
+        modeller.object(name);
+        modeller.placed(stand, chair);
+        let corners = modeller.mesh.triangles[first..].iter();
+        let corners = corners.map(|corners| corners.map(|i| modeller.mesh.positions[i as usize]));
+        let material = Material::diffuse(color.into(), Vec3::ZERO);
+        room.materials.push(material.clone());
+        let model = ObjectModel::from_corners(name, corners.collect(), material)?;
+        models.push(Arc::new(model));
+    }
+    room.mesh = modeller.mesh;
+    if !is_textured {
+        room.mesh.corner_uvs.clear();
+    }
     Ok(Furnished {
         name: room.name.clone(),
         how: String::new(),
@@ -216,41 +224,10 @@ fn flatten(material: &mut Material) {
     }
 }
 
-fn chairs(stands: [DAffine3; 2]) -> Mesh {
-    let mut modeller = Modeller::default();
-    for ((name, ..), stand) in CHAIRS.into_iter().zip(stands) {
-        modeller.object(name);
-        modeller.placed(stand, chair);
-    }
-    modeller.mesh
-}
-
-fn corners_of(mesh: &Mesh, object: u32) -> Vec<[DVec3; 3]> {
-    let triangles = mesh.triangles.iter().zip(&mesh.object_of);
-    triangles
-        .filter(|(_, of)| **of == object)
-        .map(|(corners, _)| corners.map(|i| mesh.positions[i as usize]))
-        .collect()
-}
-
-/// Appends the objects of a mesh to another.
-fn append(mesh: &mut Mesh, other: Mesh) {
-    let (corners, objects) = (mesh.positions.len() as u32, mesh.objects.len() as u32);
-    mesh.positions.extend(other.positions);
-    mesh.objects.extend(other.objects);
-    let triangles = other.triangles.into_iter();
-    mesh.triangles
-        .extend(triangles.map(|t| t.map(|i| i + corners)));
-    let object_of = other.object_of.into_iter();
-    mesh.object_of.extend(object_of.map(|k| k + objects));
-    if !mesh.corner_uvs.is_empty() {
-        mesh.corner_uvs.extend(other.corner_uvs);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::geometry::Ray;
 
     #[test]
     fn chairs_stand_free_in_the_room_and_are_seen() {
@@ -268,13 +245,8 @@ mod tests {
             }
             let corners = scene.corners(triangle as u32);
             for i in 0..3 {
-                let (from, to) = (corners[i], corners[(i + 1) % 3]);
-                let direction = to - from;
-                let ray = crate::scene::geometry::Ray {
-                    t_max: direction.length(),
-                    ..crate::scene::geometry::Ray::new(from, direction.normalize_or_zero())
-                };
-                let hit = room.lit.scene.intersect(&ray);
+                let hit =
+                    (room.lit.scene).intersect(&Ray::between(corners[i], corners[(i + 1) % 3]));
                 assert!(hit.is_none(), "{object} {hit:?}");
             }
         }

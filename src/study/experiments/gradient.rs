@@ -5,13 +5,12 @@ use crate::inverse::paths::derivative::{Gradient, differentiate};
 use crate::inverse::paths::trace::Tracer;
 use crate::inverse::settings::LightSampling;
 use crate::inverse::unknowns::Unknowns;
-use crate::math::color::luminance;
 use crate::math::rng::Stream;
 use crate::math::stats::Moments;
 use crate::scene::Scene;
-use crate::transport::emitters::Emitters;
+use crate::transport::emitters::{Emitters, powers};
 use crate::transport::material::Lobe;
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 
 /// Key of the paths; differs from those of solvers.
@@ -61,8 +60,7 @@ pub fn noise(
             of_pixel(problem, &tracer, unknowns, frame, pixel, paths)
         })
         .collect();
-    let mut variance = Moments::default();
-    found.iter().for_each(|(value, _)| variance.push(*value));
+    let variance: Moments = found.iter().map(|(value, _)| *value).collect();
     let rays: u64 = found.iter().map(|(_, rays)| rays).sum();
     Noise {
         variance: variance.mean,
@@ -100,10 +98,7 @@ pub fn tracer<'a>(
 
 /// Emitters of the mesh, weighted by area × luminance.
 pub fn lamps(scene: &Scene, emission: &[Vec3]) -> Emitters {
-    let weights: Vec<f64> = (scene.objects.iter().zip(emission))
-        .map(|(object, emission)| object.area * f64::from(luminance(*emission)))
-        .collect();
-    Emitters::new(scene, &weights)
+    Emitters::new(scene, &powers(scene, emission.iter().copied()))
 }
 
 /// Summed variance of a pixel's derivatives, and the rays cast.
@@ -115,8 +110,8 @@ fn of_pixel(
     pixel: usize,
     paths: u64,
 ) -> (f64, u64) {
-    let width = problem.photographs[frame].width as usize;
-    let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
+    let camera = &problem.scene.cameras[frame];
+    let corner = camera.corner(pixel);
     let parameters = 2 * unknowns.surfaces();
     let mut gradient = Gradient::new(parameters);
     let (mut vertices, mut gathered) = (Vec::new(), Vec::new());
@@ -125,12 +120,7 @@ fn of_pixel(
     for path in 0..paths {
         let mut stream = Stream::new(KEY, frame as u64, pixel as u64, path);
         vertices.clear();
-        let (cast, _) = tracer.pixel_path(
-            &problem.scene.cameras[frame],
-            corner,
-            &mut stream,
-            &mut vertices,
-        );
+        let (cast, _) = tracer.pixel_path(camera, corner, &mut stream, &mut vertices);
         rays += cast;
         gradient.clear();
         differentiate(&vertices, unknowns, &[], &mut gathered, &mut gradient);

@@ -3,7 +3,7 @@
 use crate::capture::exposure::Exposure;
 use crate::compose::backdrop::Backdrop;
 use crate::compose::denoise::denoised;
-use crate::compose::insert::Insertion;
+use crate::compose::insert::{Insertion, Layers};
 use crate::compose::naive::{Pasted, harmonics_of_estimate, harmonics_of_photographs};
 use crate::compose::placement::PlacedObject;
 use crate::error::Result;
@@ -146,7 +146,11 @@ fn scene(
         name: room.name.clone(),
         file,
         likeness: [[Likeness::default(); 2]; 5],
-        grid: Grid::new(WAYS.len() - 1),
+        grid: Grid {
+            columns: WAYS.len() - 1,
+            exposure: 1.0,
+            pictures: Vec::new(),
+        },
     };
     for &frame in &room.frames {
         let camera = &scene.cameras[frame];
@@ -157,13 +161,7 @@ fn scene(
             Exposure::default(),
         )?;
         let composite = |lit: &Arc<LitScene>, options: PathOptions| {
-            let halves = [1, 2].map(|seed| {
-                let (backdrop, lit) = (backdrop.clone(), lit.clone());
-                let mut half = Insertion::new(backdrop, lit, objects.clone(), options, seed);
-                half.pass(samples / 2);
-                half
-            });
-            denoised([&halves[0], &halves[1]], Denoiser::Builtin)
+            insert(lit, &backdrop, &objects, options, [1, 2], samples)
         };
         let full = PathOptions::default();
         let lit = Arc::new(cache.lit(scene));
@@ -225,16 +223,26 @@ fn scene(
     Ok(found)
 }
 
+/// The denoised composite and its layers, of two halves with their own seeds.
+pub fn insert(
+    lit: &Arc<LitScene>,
+    backdrop: &Backdrop,
+    objects: &[Arc<PlacedObject>],
+    options: PathOptions,
+    seeds: [u64; 2],
+    samples: u32,
+) -> (Picture, Layers) {
+    let [a, b] = seeds.map(|seed| {
+        let (lit, objects) = (lit.clone(), objects.to_vec());
+        let mut half = Insertion::new(backdrop.clone(), lit, objects, options, seed);
+        half.pass(samples / 2);
+        half
+    });
+    denoised([&a, &b], Denoiser::Builtin)
+}
+
 fn table(scenes: &[Scene]) -> Table {
-    let mut table = Table::new(&[
-        "room",
-        "way",
-        "place",
-        "pixels",
-        "relative_error",
-        "psnr",
-        "ssim",
-    ]);
+    let mut table = Table::new("room,way,place,pixels,relative_error,psnr,ssim");
     for scene in scenes {
         for (way, places) in WAYS.iter().zip(&scene.likeness) {
             for (place, likeness) in PLACES.iter().zip(places) {
@@ -255,12 +263,10 @@ fn table(scenes: &[Scene]) -> Table {
 
 fn plot(scenes: &[Scene]) -> Plot {
     let series = scenes.iter().flat_map(|scene| {
-        (0..PLACES.len()).map(|place| Series {
-            name: format!("{}, {}", scene.name, PLACES[place]),
-            points: (scene.likeness.iter().enumerate())
-                .map(|(way, likeness)| [way as f64 + 1.0, likeness[place].psnr()])
-                .collect(),
-            ..Series::default()
+        (0..PLACES.len()).map(|place| {
+            let ways = (1u32..).zip(&scene.likeness);
+            let points = ways.map(|(way, likeness)| [f64::from(way), likeness[place].psnr()]);
+            Series::line(format!("{}, {}", scene.name, PLACES[place]), points)
         })
     });
     Plot {
@@ -294,12 +300,7 @@ fn summary(scenes: &[Scene]) -> Summary {
         })
     });
     Summary {
-        columns: vec![
-            "room",
-            "way",
-            "objects: relative error · PSNR · SSIM",
-            "shadow and bleed: the same",
-        ],
+        columns: "room | way | objects: relative error · PSNR · SSIM | shadow and bleed: the same",
         rows: rows.collect(),
     }
 }

@@ -28,7 +28,7 @@ impl Likeness {
         let similarity = similarity(&shown(picture, exposure), &shown(truth, exposure), truth);
         let pixels = picture.pixels.iter().zip(&truth.pixels);
         for (index, (&a, &b)) in pixels.enumerate().filter(|(i, _)| mask[*i]) {
-            let display = |v: Vec3| Vec3::from_array((v * exposure).to_array().map(to_display));
+            let display = |v: Vec3| (v * exposure).map(linear_to_srgb);
             self.pixels += 1.0;
             self.linear += f64::from((a - b).length_squared()) / 3.0;
             self.level += f64::from(b.element_sum()) / 3.0;
@@ -58,20 +58,9 @@ impl Likeness {
     }
 }
 
-fn to_display(value: f32) -> f32 {
-    linear_to_srgb(value.clamp(0.0, 1.0))
-}
-
 /// Displayed greyscale values.
 fn shown(picture: &Picture, exposure: f32) -> Vec<f64> {
-    let grey = |v: &Vec3| {
-        (*v * exposure)
-            .to_array()
-            .map(to_display)
-            .iter()
-            .sum::<f32>()
-            / 3.0
-    };
+    let grey = |v: &Vec3| (*v * exposure).map(linear_to_srgb).element_sum() / 3.0;
     picture.pixels.iter().map(|v| f64::from(grey(v))).collect()
 }
 

@@ -1,23 +1,22 @@
 //! Study: multiple importance sampling.
 
 use crate::error::Result;
-use crate::export::plot::Plot;
 use crate::export::table::Table;
 use crate::inverse::settings::{LightSampling, Settings};
 use crate::room::Room;
 use crate::room::photographs::Rendering;
-use crate::study::experiments::box_room;
+use crate::study::experiments::box_room::{self, ALBEDO};
 use crate::study::experiments::course::{
     CACHE_WITHOUT, Errors, Evaluator, Mark, cache_settings, cached, descend, paper_settings,
 };
 use crate::study::experiments::courses::{
-    self, Kind, Spread, common_mark, comparison, plot, table, words,
+    self, Kind, LOSS, RAYS, SECONDS, Spread, common_mark, comparison, plot, table, words,
 };
 use crate::study::experiments::findings::{Findings, Summary, brief};
 use crate::study::experiments::gradient::{Noise, noise};
 use crate::study::experiments::study::{Bench, Study};
-use crate::study::experiments::subject::Subject;
 use crate::study::experiments::twin::{Sizes, twin};
+use crate::study::subject::Subject;
 use crate::transport::material::Lobe;
 use glam::Vec3;
 
@@ -54,12 +53,11 @@ const ROOMS: [Lamp; 3] = [
         }),
     },
 ];
-/// Mean albedo of the rooms.
-const ALBEDO: f64 = 0.5;
-const SAMPLINGS: [LightSampling; 3] = [
-    LightSampling::Mis,
-    LightSampling::Emitter,
-    LightSampling::Bsdf,
+/// The samplings that are compared, in words too.
+const SAMPLINGS: [(LightSampling, &str); 3] = [
+    (LightSampling::Mis, "both (MIS)"),
+    (LightSampling::Emitter, "light sampling"),
+    (LightSampling::Bsdf, "BSDF sampling"),
 ];
 /// Means within this factor of each other count as equal.
 const AS_GOOD: f64 = 1.05;
@@ -75,22 +73,11 @@ struct Lamp {
     board: Option<Lobe>,
 }
 
-/// A room to compare.
-struct LitByLamp {
-    files: [&'static str; 2],
-    room: Room,
-    rendering: Rendering,
-}
-
 impl Lamp {
-    fn lit(&self, quick: bool) -> LitByLamp {
-        LitByLamp {
-            files: self.files,
-            room: match self.board {
-                Some(lobe) => box_room::board_room(self.name, ALBEDO, self.half_side, lobe),
-                None => box_room::box_room(self.name, ALBEDO, self.half_side),
-            },
-            rendering: box_room::rendering(quick),
+    fn room(&self) -> Room {
+        match self.board {
+            Some(lobe) => box_room::board_room(self.name, ALBEDO, self.half_side, lobe),
+            None => box_room::box_room(self.name, ALBEDO, self.half_side),
         }
     }
 }
@@ -126,45 +113,40 @@ fn run(bench: &Bench) -> Result<Findings> {
     let how = twin
         .as_ref()
         .map_or_else(own_rooms, |twin| twin.words.clone());
-    let rooms: Vec<LitByLamp> = match twin {
-        Some(twin) => vec![LitByLamp {
-            files: ROOMS[0].files,
-            room: twin.room,
-            rendering: twin.rendering,
-        }],
-        None => ROOMS.iter().map(|lamp| lamp.lit(bench.quick)).collect(),
+    let rooms: Vec<([&str; 2], Room, Rendering)> = match twin {
+        Some(twin) => vec![(ROOMS[0].files, twin.room, twin.rendering)],
+        None => (ROOMS.iter())
+            .map(|lamp| (lamp.files, lamp.room(), box_room::rendering(bench.quick)))
+            .collect(),
     };
     let limits = bench.limits(rooms.len() * SAMPLINGS.len() * bench.seeds as usize);
     let (pixels, paths) = if bench.quick { (300, 128) } else { (1000, 512) };
     let mut scenes = Vec::new();
-    for LitByLamp {
-        files,
-        room,
-        rendering,
-    } in &rooms
-    {
+    for (files, room, rendering) in &rooms {
         let name = room.name.as_str();
         bench.begin(name)?;
         let subject = Subject::of_room(room, rendering)?;
         let truth = box_room::truth(room);
         let lobes: Vec<Option<Lobe>> = room.materials.iter().map(|m| m.lobe).collect();
         let bounces = paper_settings(1).max_bounces();
-        let gauge = Evaluator::new(&subject, bounces).with_lobes(lobes.clone());
+        let gauge = Evaluator {
+            lobes: lobes.clone(),
+            ..Evaluator::new(&subject, bounces)
+        };
         let all_bounces = Evaluator::new(&subject, u32::MAX);
         let course = |index: usize, seed| {
             let settings = Settings {
-                light_sampling: SAMPLINGS[index],
+                light_sampling: SAMPLINGS[index].0,
                 ..paper_settings(seed)
             };
             descend(bench, &gauge, &settings, limits)
         };
-        let names = SAMPLINGS.map(|sampling| format!("{name}, {}", word(sampling)));
-        let over_rays = |kinds: &[Kind]| drawn(name, "rays", |mark| mark.rays as f64, kinds, &[]);
-        let kinds = courses::run(bench, names, course, over_rays)?;
+        let names = SAMPLINGS.map(|(_, word)| format!("{name}, {word}"));
+        let so_far = |kinds: &[Kind]| plot(name, RAYS, LOSS, kinds, &[]);
+        let kinds = courses::run(bench, names, course, so_far)?;
         bench.begin(&format!("{name}, variance of gradients"))?;
-        let measure = |sampling: &LightSampling| {
-            noise(&subject.problem, &truth, &lobes, *sampling, pixels, paths)
-        };
+        let measure =
+            |(sampling, _)| noise(&subject.problem, &truth, &lobes, sampling, pixels, paths);
         let cache = |seed| Settings {
             lobes: lobes.iter().any(Option::is_some),
             ..cache_settings(seed, bench.quick)
@@ -173,7 +155,7 @@ fn run(bench: &Bench) -> Result<Findings> {
             name: name.to_owned(),
             files: *files,
             kinds,
-            noises: SAMPLINGS.iter().map(measure).collect(),
+            noises: SAMPLINGS.map(measure).to_vec(),
             cache: (bench.seeds())
                 .map(|seed| cached(bench, &all_bounces, &cache(seed)))
                 .collect::<Result<_>>()?,
@@ -189,10 +171,8 @@ fn run(bench: &Bench) -> Result<Findings> {
         .collect();
     let mut plots = Vec::new();
     for scene in &scenes {
-        let draw = |label, x| drawn(&scene.name, label, x, &scene.kinds, &scene.cache);
-        let [over_rays, over_seconds] = scene.files;
-        plots.push((over_rays, draw("rays", |mark| mark.rays as f64)));
-        plots.push((over_seconds, draw("seconds", |mark| mark.seconds)));
+        let draw = |over| plot(&scene.name, over, LOSS, &scene.kinds, &scene.cache);
+        plots.extend(scene.files.into_iter().zip([RAYS, SECONDS].map(draw)));
     }
     Ok(Findings {
         how: format!(
@@ -216,31 +196,10 @@ fn run(bench: &Bench) -> Result<Findings> {
     })
 }
 
-/// Plot of the losses in one room.
-fn drawn(name: &str, label: &str, x: fn(&Mark) -> f64, kinds: &[Kind], cache: &[Mark]) -> Plot {
-    let loss = |errors: &Errors| errors.loss;
-    let held_out = "held-out l1 loss, radiance";
-    plot(name, label, held_out, x, loss, kinds, cache)
-}
-
-fn word(sampling: LightSampling) -> &'static str {
-    match sampling {
-        LightSampling::Mis => "both (MIS)",
-        LightSampling::Emitter => "light sampling",
-        LightSampling::Bsdf => "BSDF sampling",
-    }
-}
-
 fn variances(scenes: &[LitRoom]) -> Table {
-    let mut table = Table::new(&[
-        "scene",
-        "sampling",
-        "variance",
-        "standard_error",
-        "rays_per_path",
-    ]);
+    let mut table = Table::new("scene,sampling,variance,standard_error,rays_per_path");
     for scene in scenes {
-        for (sampling, noise) in SAMPLINGS.iter().zip(&scene.noises) {
+        for ((sampling, _), noise) in SAMPLINGS.iter().zip(&scene.noises) {
             table.row(&[
                 scene.name.as_str().into(),
                 sampling.word().into(),
@@ -256,8 +215,8 @@ fn variances(scenes: &[LitRoom]) -> Table {
 /// An error at the last mark that all of a room's courses passed.
 fn at_equal_rays(scene: &LitRoom, quantity: fn(&Errors) -> Option<f64>) -> Vec<Option<Spread>> {
     let mark = common_mark(&scene.kinds);
-    let loss = |kind: &Kind| mark.and_then(|mark| kind.at_mark(mark, quantity));
-    scene.kinds.iter().map(loss).collect()
+    let at = |kind: &Kind| kind.at_mark(mark, quantity);
+    scene.kinds.iter().map(at).collect()
 }
 
 fn summary(scenes: &[LitRoom]) -> Summary {
@@ -278,15 +237,8 @@ fn summary(scenes: &[LitRoom]) -> Summary {
         }
     }
     Summary {
-        columns: vec![
-            "scene, sampling",
-            "loss at equal rays",
-            "albedo error at equal rays",
-            "loss at the end",
-            "gradient variance a path",
-            "rays a path",
-            "variance × rays",
-        ],
+        columns: "scene, sampling | loss at equal rays | albedo error at equal rays | loss at the end | \
+                  gradient variance a path | rays a path | variance × rays",
         rows,
     }
 }

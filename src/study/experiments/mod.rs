@@ -26,17 +26,18 @@ mod sampling;
 mod selection;
 mod standing;
 mod study;
-mod subject;
 mod summed;
 mod table1;
 mod textures;
 mod twin;
 
+pub use crate::study::subject::Subject;
 pub use chair::chair;
 pub use findings::{Findings, Grid, Summary};
+pub(super) use insertion::insert;
+pub(super) use standing::upright;
 pub use standing::{Cylinder, places, up};
 pub use study::{Bench, Limits, Study};
-pub use subject::Subject;
 
 /// All studies, in the order of `relit study all`.
 pub const STUDIES: &[Study] = &[

@@ -66,11 +66,11 @@ pub fn hit_error(room: &Room, scene: &Scene, met: &[bool], size: f64) -> f64 {
     let mut errors = Vec::new();
     let mut met = met.iter();
     for (camera, (lens, pose)) in scene.cameras.iter().zip(&exact) {
-        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        for pixel in 0..camera.pixels() {
             if met.next() != Some(&true) {
                 continue;
             }
-            let at = Vec2::new(x as f32, y as f32) + 0.5;
+            let at = camera.corner(pixel) + 0.5;
             let Some(hit) = scene.intersect(&camera.ray(at)) else {
                 errors.push(1.0);
                 continue;
@@ -78,12 +78,8 @@ pub fn hit_error(room: &Room, scene: &Scene, met: &[bool], size: f64) -> f64 {
             let corners = room.mesh.triangles[hit.triangle as usize];
             let [a, b, c] = corners.map(|i| room.mesh.positions[i as usize]);
             let normal = (b - a).cross(c - a);
-            let direction = pose.rotation
-                * DVec3::new(
-                    (f64::from(at.x) - lens.cx) / lens.fx,
-                    (lens.cy - f64::from(at.y)) / lens.fy,
-                    -1.0,
-                );
+            let on_plane = lens.normalized(at.as_dvec2());
+            let direction = pose.rotation * DVec3::new(on_plane.x, -on_plane.y, -1.0);
             let t = (a - pose.center).dot(normal) / direction.dot(normal);
             let found = scene.point(&hit).as_dvec3() + scene.origin;
             errors.push((pose.center + direction * t - found).length() / size);
@@ -95,11 +91,11 @@ pub fn hit_error(room: &Room, scene: &Scene, met: &[bool], size: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::experiments::box_room::box_room;
+    use crate::study::experiments::box_room::standard;
 
     #[test]
     fn hits_are_exact_at_any_size_and_lost_beside_something_very_far_away() {
-        let room = box_room("room", 0.5, 0.25);
+        let room = standard();
         let error = |(room, size): (Room, f64)| {
             let lit = room.lit([16, 12]).expect("a scene");
             hit_error(&room, &lit.scene, &[true; 16 * 12 * 6], size)

@@ -12,8 +12,8 @@ use crate::scene::visibility::NOTHING;
 use crate::study::experiments::box_room;
 use crate::study::experiments::chair::chair;
 use crate::study::experiments::closed_form;
-use crate::study::experiments::subject::Subject;
 use crate::study::experiments::twin::Studied;
+use crate::study::subject::Subject;
 use crate::transport::material::Material;
 use glam::{DAffine3, DVec3, Vec3};
 use std::cmp::Reverse;
@@ -39,9 +39,6 @@ pub struct Posed {
 }
 
 /// A convex object of one colour under a black lamp, with photographs in closed form.
-///
-/// # Errors
-/// Never for this scene.
 pub fn convex(quick: bool) -> Result<Posed> {
     let size = if quick { [48, 36] } else { [128, 96] };
     let room = gem();
@@ -95,9 +92,6 @@ fn gem() -> Room {
 }
 
 /// A chair that shadows itself, in a room with interreflection, with path-traced photographs of all bounces.
-///
-/// # Errors
-/// Never for this scene.
 pub fn shadowed(quick: bool) -> Result<Posed> {
     let (size, samples) = if quick {
         ([32, 24], 32)

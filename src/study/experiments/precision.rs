@@ -9,9 +9,9 @@ use crate::study::experiments::course::{cache_settings, solved};
 use crate::study::experiments::findings::{Findings, Summary, brief};
 use crate::study::experiments::moved::{self, hit_error};
 use crate::study::experiments::study::{Bench, Study};
-use crate::study::experiments::subject::Subject;
 use crate::study::experiments::summed::Paths;
 use crate::study::experiments::twin::studied;
+use crate::study::subject::Subject;
 use glam::Vec3;
 
 /// The study.
@@ -23,10 +23,6 @@ pub const STUDY: Study = Study {
     run,
 };
 
-/// Mean albedo.
-const ALBEDO: f64 = 0.5;
-/// Half side of the lamp in metres.
-const LAMP: f64 = 0.25;
 /// Largest tolerable relative error. For a fit it is twice the difference between two seeds.
 const TOLERABLE: f64 = 1e-3;
 
@@ -45,12 +41,7 @@ fn run(bench: &Bench) -> Result<Findings> {
     let powers = |low: i32, high: i32| -> Vec<f64> {
         (low..=high).step_by(step).map(|k| 10f64.powi(k)).collect()
     };
-    let words = format!("A box room of mean albedo {ALBEDO}");
-    let own_room = || {
-        let room = box_room::box_room("box room", ALBEDO, LAMP);
-        (room, box_room::rendering(true))
-    };
-    let studied = studied(bench, &words, own_room)?;
+    let studied = studied(bench, box_room::rendering(true))?;
     let subject = studied.photographed()?;
     let (words, room) = (studied.words, studied.room);
     let reflects: Vec<bool> = (room.materials.iter())
@@ -166,7 +157,7 @@ fn lamps(subject: &Subject, reflects: &[bool]) -> [usize; 2] {
 }
 
 fn findings(words: &str, noise: f64, lines: &[Line]) -> Findings {
-    let mut table = Table::new(&["axis", "quantity", "value", "relative_error"]);
+    let mut table = Table::new("axis,quantity,value,relative_error");
     for line in lines {
         for &(value, error) in &line.points {
             table.row(&[
@@ -200,14 +191,7 @@ fn findings(words: &str, noise: f64, lines: &[Line]) -> Findings {
         tables: vec![("", table)],
         plots: vec![("", plot(lines))],
         summary: Summary {
-            columns: vec![
-                "axis",
-                "quantity",
-                "least error",
-                "largest error",
-                "tolerable",
-                "reach",
-            ],
+            columns: "axis | quantity | least error | largest error | tolerable | reach",
             rows: lines.iter().map(row).collect(),
         },
         seen: (lines.iter())
@@ -218,10 +202,9 @@ fn findings(words: &str, noise: f64, lines: &[Line]) -> Findings {
 }
 
 fn plot(lines: &[Line]) -> Plot {
-    let series = |line: &Line| Series {
-        name: format!("{}: {}", line.axis, line.quantity),
-        points: line.points.iter().map(|&(x, y)| [x, y]).collect(),
-        ..Series::default()
+    let series = |line: &Line| {
+        let name = format!("{}: {}", line.axis, line.quantity);
+        Series::line(name, line.points.iter().map(|&(x, y)| [x, y]))
     };
     Plot {
         title: "Relative errors of 32 bits".to_owned(),

@@ -7,7 +7,7 @@ use crate::capture::orientation::Orientation;
 use crate::capture::reading::{Axes, Reading};
 use crate::capture::working::load_working;
 use crate::error::Result;
-use crate::export::table::{Cell, Table};
+use crate::export::table::Table;
 use crate::room;
 use crate::room::generated::Family;
 use crate::scene::Scene;
@@ -36,17 +36,8 @@ const MAX_CAPTURES: usize = 6;
 pub struct Mistake {
     /// Description.
     pub name: &'static str,
-    /// How to introduce it.
-    pub made: Made,
-}
-
-/// How to introduce a mistake into a correct capture.
-#[derive(Debug, Clone, Copy)]
-pub enum Made {
-    /// By reading its files in this way.
-    Reading(Reading),
-    /// By using the first photograph for all poses.
-    OnePhotograph,
+    /// The reading of a correct capture's files that introduces it; `None` for the first photograph at all poses.
+    pub reading: Option<Reading>,
 }
 
 /// Outcome of checking a capture.
@@ -65,7 +56,7 @@ pub fn mistakes() -> Vec<Mistake> {
     let sound = Reading::default();
     let mistake = |name, reading| Mistake {
         name,
-        made: Made::Reading(reading),
+        reading: Some(reading),
     };
     let scaled = |mesh_scale| Reading {
         mesh_scale,
@@ -100,7 +91,7 @@ pub fn mistakes() -> Vec<Mistake> {
         mistake("photographs shifted by one", Reading { shift: 1, ..sound }),
         Mistake {
             name: "all photographs the same",
-            made: Made::OnePhotograph,
+            reading: None,
         },
         mistake(
             "poses with OpenCV's axes",
@@ -120,18 +111,18 @@ pub fn mistakes() -> Vec<Mistake> {
 }
 
 fn run(bench: &Bench) -> Result<Findings> {
-    let mut table = Table::new(&["room", "mistake", "agreement", "refused", "right"]);
+    let mut table = Table::new("room,mistake,agreement,refused,right");
     let mut summary = Summary {
-        columns: vec!["mistake", "rooms", "refused", "with the right remedy"],
+        columns: "mistake | rooms | refused | with the right remedy",
         rows: Vec::new(),
     };
     let mut row = |capture: &Capture, name: &str, outcome: &Outcome| {
         table.row(&[
-            Cell::from(capture.name.as_str()),
-            Cell::from(name),
-            Cell::from(outcome.alignment.agreement),
-            Cell::from(u64::from(outcome.detected)),
-            Cell::from(u64::from(outcome.right_remedy)),
+            capture.name.as_str().into(),
+            name.into(),
+            outcome.alignment.agreement.into(),
+            u64::from(outcome.detected).into(),
+            u64::from(outcome.right_remedy).into(),
         ]);
     };
 
@@ -139,21 +130,20 @@ fn run(bench: &Bench) -> Result<Findings> {
     let subject = bench.subject.map(|subject| (*subject.capture).clone());
     let mut captures = vec![in_memory(&subject.map_or_else(room::capture, Ok)?)?];
     let first = decide(&captures[0], None)?;
-    let mut sound = Sound::default();
-    sound.count(&first);
     row(&captures[0], "none", &first);
+    let mut sound = vec![first];
     let families = match bench.subject {
         Some(_) => &[],
         None => &Family::ALL[..],
     };
     for family in families {
         for seed in bench.seeds() {
-            let so_far = format!("{} of {} refused so far", sound.refused, sound.all);
+            let so_far = format!("{} of {} refused so far", refused(&sound), sound.len());
             bench.begin(&format!("{} room {seed}, sound; {so_far}", family.name()))?;
             let capture = in_memory(&family.generate(seed, rooms::SIZE)?.capture)?;
             let outcome = decide(&capture, None)?;
-            sound.count(&outcome);
             row(&capture, "none", &outcome);
+            sound.push(outcome);
             if *family == Family::Plain && captures.len() < MAX_CAPTURES {
                 captures.push(capture);
             }
@@ -199,29 +189,23 @@ fn run(bench: &Bench) -> Result<Findings> {
             format!(
                 "Of {} sound captures {} were refused, and of {} it was said that it cannot be told. {} of their photographs were said \
                 to have another's pose.",
-                sound.all, sound.refused, sound.doubtful, sound.mispaired
+                sound.len(),
+                refused(&sound),
+                (sound.iter())
+                    .filter(|outcome| outcome.alignment.decision == Decision::Doubtful)
+                    .count(),
+                (sound.iter())
+                    .map(|outcome| outcome.alignment.mispaired.len())
+                    .sum::<usize>(),
             ),
         ],
         ..Findings::default()
     })
 }
 
-/// What was said of sound captures.
-#[derive(Debug, Default)]
-struct Sound {
-    all: u64,
-    refused: u64,
-    doubtful: u64,
-    mispaired: usize,
-}
-
-impl Sound {
-    fn count(&mut self, outcome: &Outcome) {
-        self.all += 1;
-        self.refused += u64::from(outcome.detected);
-        self.doubtful += u64::from(outcome.alignment.decision == Decision::Doubtful);
-        self.mispaired += outcome.alignment.mispaired.len();
-    }
+/// Number of captures that were refused.
+fn refused(outcomes: &[Outcome]) -> usize {
+    outcomes.iter().filter(|outcome| outcome.detected).count()
 }
 
 /// The capture with its photographs in memory, so that files are read only once.
@@ -235,11 +219,11 @@ fn in_memory(capture: &Capture) -> Result<Capture> {
 /// The capture cannot be read.
 pub fn decide(capture: &Capture, mistake: Option<&Mistake>) -> Result<Outcome> {
     let mut capture = capture.clone();
-    let made = mistake.map(|mistake| mistake.made);
+    let made = mistake.map(|mistake| mistake.reading);
     match made {
         None => {}
-        Some(Made::Reading(reading)) => capture = capture.read_as(&reading),
-        Some(Made::OnePhotograph) => {
+        Some(Some(reading)) => capture = capture.read_as(&reading),
+        Some(None) => {
             let first = capture.frames.first().map(|frame| frame.photograph.clone());
             for (frame, first) in capture.frames.iter_mut().zip(first.iter().cycle()) {
                 frame.photograph = first.clone();
@@ -251,8 +235,8 @@ pub fn decide(capture: &Capture, mistake: Option<&Mistake>) -> Result<Outcome> {
     let none_left = leave_out(&capture, &mut working).is_err();
     let alignment = Alignment::new(&scene, &working.photographs);
     let mended = match (&alignment.decision, made) {
-        (_, Some(Made::OnePhotograph)) => none_left,
-        (Decision::Wrong { reading, .. }, Some(Made::Reading(made))) => undone(&made.then(reading)),
+        (_, Some(None)) => none_left,
+        (Decision::Wrong { reading, .. }, Some(Some(made))) => undone(&made.then(reading)),
         _ => false,
     };
     Ok(Outcome {

@@ -10,7 +10,7 @@ use crate::study::experiments::course::{
     Evaluator, Mark, descend, descend_by, estimate, paper_settings, rays_at,
 };
 use crate::study::experiments::courses::{
-    self, Kind, Quantity, common_mark, comparison, plot, table, words,
+    self, ALBEDO, Kind, LOSS, RAYS, Shown, common_mark, comparison, plot, table, words,
 };
 use crate::study::experiments::evenness::{Evenness, measure};
 use crate::study::experiments::findings::{Findings, Summary, brief};
@@ -28,10 +28,6 @@ pub const STUDY: Study = Study {
     run,
 };
 
-/// Mean albedo.
-const ALBEDO: f64 = 0.5;
-/// Half side of the lamp in metres.
-const LAMP: f64 = 0.25;
 /// Steps between updates of the residual.
 const UPDATE_INTERVAL: u64 = 500;
 const UNIFORM: &str = "uniform";
@@ -60,12 +56,7 @@ const STRATEGIES: [(&str, Strategy); 5] = [
 
 fn run(bench: &Bench) -> Result<Findings> {
     let limits = bench.limits(STRATEGIES.len() * bench.seeds as usize);
-    let words = format!("A box room of mean albedo {ALBEDO}");
-    let own_room = || {
-        let room = box_room::box_room("box room", ALBEDO, LAMP);
-        (room, box_room::rendering(bench.quick))
-    };
-    let studied = studied(bench, &words, own_room)?;
+    let studied = studied(bench, box_room::rendering(bench.quick))?;
     let subject = studied.photographed()?;
     let gauge = Evaluator::new(&subject, paper_settings(1).max_bounces());
     let names = STRATEGIES.iter().map(|(name, _)| (*name).to_owned());
@@ -73,7 +64,7 @@ fn run(bench: &Bench) -> Result<Findings> {
         let strategy = STRATEGIES[index].1;
         descent(bench, &gauge, strategy, &paper_settings(seed), limits)
     };
-    let kinds = courses::run(bench, names, course, of_loss)?;
+    let kinds = courses::run(bench, names, course, |kinds| drawn(kinds, LOSS))?;
     bench.begin("paths")?;
     let truth = box_room::truth(&studied.room);
     let (pixels, max) = if bench.quick { (16, 256) } else { (64, 4096) };
@@ -96,11 +87,8 @@ fn run(bench: &Bench) -> Result<Findings> {
             ("-paths", of_paths(&evenness)),
         ],
         plots: vec![
-            ("", of_loss(&kinds)),
-            (
-                "-albedo",
-                drawn(&kinds, "mean absolute error of albedo", |e| e.albedo),
-            ),
+            ("", drawn(&kinds, LOSS)),
+            ("-albedo", drawn(&kinds, ALBEDO)),
             ("-paths", evenness_plot(&evenness)),
         ],
         summary: summary(&kinds, &evenness),
@@ -109,14 +97,8 @@ fn run(bench: &Bench) -> Result<Findings> {
     })
 }
 
-fn of_loss(kinds: &[Kind]) -> Plot {
-    drawn(kinds, "held-out l1 loss, radiance", |e| e.loss)
-}
-
-fn drawn(kinds: &[Kind], label: &str, quantity: Quantity) -> Plot {
-    let title = "Pixels of the paper's descent";
-    let rays = |mark: &Mark| mark.rays as f64;
-    plot(title, "rays", label, rays, quantity, kinds, &[])
+fn drawn(kinds: &[Kind], shown: Shown) -> Plot {
+    plot("Pixels of the paper's descent", RAYS, shown, kinds, &[])
 }
 
 /// One course of the descent.
@@ -127,7 +109,7 @@ fn descent(
     settings: &Settings,
     limits: Limits,
 ) -> Vec<Mark> {
-    let problem = gauge.problem();
+    let problem = &gauge.subject.problem;
     let bounces = settings.max_bounces();
     let mut groups = match strategy {
         Strategy::Uniform => return descend(bench, gauge, settings, limits),
@@ -156,7 +138,7 @@ fn descent(
 }
 
 fn of_paths(evenness: &[Evenness]) -> Table {
-    let mut table = Table::new(&["paths", "random", "low_discrepancy"]);
+    let mut table = Table::new("paths,random,low_discrepancy");
     for at in evenness {
         table.row(&[at.paths.into(), at.random.into(), at.sequence.into()]);
     }
@@ -164,12 +146,8 @@ fn of_paths(evenness: &[Evenness]) -> Table {
 }
 
 fn evenness_plot(evenness: &[Evenness]) -> Plot {
-    let series = |name: &str, noise: fn(&Evenness) -> f64| Series {
-        name: name.to_owned(),
-        points: (evenness.iter())
-            .map(|at| [at.paths as f64, noise(at)])
-            .collect(),
-        ..Series::default()
+    let series = |name: &str, noise: fn(&Evenness) -> f64| {
+        Series::line(name, evenness.iter().map(|at| [at.paths as f64, noise(at)]))
     };
     Plot {
         title: "Noise of a pixel's mean".to_owned(),
@@ -187,11 +165,10 @@ fn summary(kinds: &[Kind], evenness: &[Evenness]) -> Summary {
     let mark = common_mark(kinds);
     let mut rows: Vec<Vec<String>> = (kinds.iter())
         .map(|kind| {
-            let at = |quantity| words(mark.and_then(|mark| kind.at_mark(mark, quantity)));
             vec![
                 format!("pixels {}", kind.name),
-                at(|e| e.loss),
-                at(|e| e.albedo),
+                words(kind.at_mark(mark, |e| e.loss)),
+                words(kind.at_mark(mark, |e| e.albedo)),
                 words(kind.at_end(|e| e.loss)),
                 words(kind.at_end(|e| e.albedo)),
             ]
@@ -207,13 +184,7 @@ fn summary(kinds: &[Kind], evenness: &[Evenness]) -> Summary {
         ]
     }));
     Summary {
-        columns: vec![
-            "what",
-            "loss at equal rays",
-            "albedo error at equal rays",
-            "loss at the end",
-            "albedo error at the end",
-        ],
+        columns: "what | loss at equal rays | albedo error at equal rays | loss at the end | albedo error at the end",
         rows,
     }
 }
@@ -221,7 +192,7 @@ fn summary(kinds: &[Kind], evenness: &[Evenness]) -> Summary {
 fn seen(kinds: &[Kind], evenness: &[Evenness]) -> Vec<String> {
     let mut seen = Vec::new();
     if let Some(mark) = common_mark(kinds) {
-        let at = |kind: &Kind| kind.at_mark(mark, |e| e.albedo);
+        let at = |kind: &Kind| kind.at_mark(Some(mark), |e| e.albedo);
         let uniform = kinds.iter().find(|kind| kind.name == UNIFORM).and_then(at);
         for kind in kinds.iter().filter(|kind| kind.name != UNIFORM) {
             let (Some(uniform), Some(other)) = (uniform, at(kind)) else {

@@ -4,6 +4,7 @@ use crate::calibrate::held_out::HoldOut;
 use crate::calibrate::problem::Problem;
 use crate::inverse::paper::pixel::Drawn;
 use crate::inverse::settings::Settings;
+use crate::math::cumulative::Cumulative;
 use crate::math::rng::Stream;
 use crate::scene::visibility::NOTHING;
 use crate::transport::lit::LitScene;
@@ -22,8 +23,8 @@ const UNIFORM_FRACTION: f64 = 0.2;
 pub struct Groups {
     /// For each group, its pixels as (frame, pixel).
     pixels: Vec<Vec<(u32, u32)>>,
-    /// Cumulative probabilities of the groups.
-    cumulative: Vec<f64>,
+    /// Probabilities of the groups.
+    probabilities: Cumulative,
     total: usize,
     /// Whether gradients are weighted to be unbiased for uniform draws.
     weighted: bool,
@@ -75,39 +76,19 @@ impl Groups {
         }
         pixels.retain(|group| !group.is_empty());
         let total = pixels.iter().map(Vec::len).sum();
-        let even = vec![1.0; pixels.len()];
-        let mut groups = Self {
+        Self {
+            probabilities: probabilities(&vec![1.0; pixels.len()]),
             pixels,
-            cumulative: Vec::new(),
             total,
             weighted,
-        };
-        groups.set(&even);
-        groups
-    }
-
-    /// Sets the groups' probabilities in proportion to `fractions`.
-    fn set(&mut self, fractions: &[f64]) {
-        let sum: f64 = fractions.iter().sum();
-        let mut end = 0.0;
-        self.cumulative = fractions
-            .iter()
-            .map(|fraction| {
-                end += fraction / sum;
-                end
-            })
-            .collect();
+        }
     }
 
     /// Draws a pixel.
     pub fn draw(&self, stream: &mut Stream) -> Option<Drawn> {
         let at = stream.uniform_f64();
-        let group = self
-            .cumulative
-            .partition_point(|&end| end <= at)
-            .min(self.cumulative.len().checked_sub(1)?);
-        let chance =
-            self.cumulative[group] - group.checked_sub(1).map_or(0.0, |g| self.cumulative[g]);
+        let group = self.probabilities.index_at(at)?;
+        let chance = self.probabilities.sums()[group] - self.probabilities.before(group);
         let pixels = &self.pixels[group];
         let (frame, pixel) = pixels[stream.below(pixels.len())];
         let weight = if self.weighted {
@@ -138,11 +119,8 @@ impl Groups {
                     let mut stream = Stream::new(key, group as u64, 0, path);
                     let (frame, pixel) = pixels[stream.below(pixels.len())];
                     let photograph = &problem.photographs[frame as usize];
-                    let corner = Vec2::new(
-                        (pixel % photograph.width) as f32,
-                        (pixel / photograph.width) as f32,
-                    );
                     let camera = &problem.scene.cameras[frame as usize];
+                    let corner = camera.corner(pixel as usize);
                     let ray = camera.ray(corner + Vec2::from(stream.uniform2()));
                     let sample = radiance(lit, &ray, &mut stream, options);
                     difference += sample.radiance - photograph.pixels[pixel as usize];
@@ -159,9 +137,15 @@ impl Groups {
                 UNIFORM_FRACTION * n / self.total as f64 + (1.0 - UNIFORM_FRACTION) * r / sum
             })
             .collect();
-        self.set(&fractions);
+        self.probabilities = probabilities(&fractions);
         found.iter().map(|(_, rays)| rays).sum()
     }
+}
+
+/// Probabilities in proportion to `fractions`.
+fn probabilities(fractions: &[f64]) -> Cumulative {
+    let sum: f64 = fractions.iter().sum();
+    Cumulative::new(fractions.iter().map(|fraction| fraction / sum))
 }
 
 #[cfg(test)]
@@ -171,7 +155,7 @@ mod tests {
 
     #[test]
     fn objects_are_drawn_alike_and_weights_make_every_pixel_count_the_same() {
-        let subject = photographed("room", 0.5, 0.25, true).expect("a room");
+        let subject = photographed(true).expect("a room");
         let (problem, settings) = (&subject.problem, Settings::default());
         let groups = Groups::by_object(problem, &settings, true);
         let objects = groups.pixels.len();

@@ -3,7 +3,7 @@
 use crate::math::frame::Frame;
 use crate::scene::Scene;
 use crate::scene::geometry::Ray;
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DAffine3, DQuat, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 use std::f32::consts::TAU;
 
@@ -37,6 +37,12 @@ pub fn up(scene: &Scene) -> Vec3 {
         .map(|(normal, &area)| normal.as_dvec3() * f64::from(area))
         .sum();
     sum.as_vec3().normalize_or(scene.up)
+}
+
+/// The rotation that stands a model of y up on the floor.
+pub fn upright(up: Vec3) -> DAffine3 {
+    let up = up.as_dvec3().normalize_or(DVec3::Y);
+    DAffine3::from_quat(DQuat::from_rotation_arc(DVec3::Y, up))
 }
 
 /// Up to `count` points on the floor where the cylinder can stand, without overlap; those seen by most cameras come first.
@@ -117,11 +123,11 @@ fn seen_by(scene: &Scene, point: Vec3) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::experiments::box_room::box_room;
+    use crate::study::experiments::box_room::standard;
 
     #[test]
     fn places_are_on_the_floor_or_the_block_apart_and_free() {
-        let lit = box_room("room", 0.5, 0.25).lit([48, 36]).expect("a scene");
+        let lit = standard().lit([48, 36]).expect("a scene");
         let scene = &*lit.scene;
         let up = up(scene);
         assert!(up.distance(Vec3::Y) < 1e-6, "{up}");

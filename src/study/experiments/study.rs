@@ -4,8 +4,8 @@ use crate::error::{Error, Result};
 use crate::export::atomic::write_bytes;
 use crate::export::plot::Plot;
 use crate::study::experiments::findings::Findings;
-use crate::study::experiments::subject::Subject;
 use crate::study::machine::Machine;
+use crate::study::subject::Subject;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -115,22 +115,21 @@ impl Findings {
     /// # Errors
     /// A file cannot be written.
     pub fn write(&self, study: &Study, folder: &Path) -> Result<Vec<PathBuf>> {
-        let file =
-            |suffix: &str, ending: &str| folder.join(format!("{}{suffix}.{ending}", study.name));
         let mut written = Vec::new();
+        let mut file = |suffix: &str, ending: &str| {
+            let path = folder.join(format!("{}{suffix}.{ending}", study.name));
+            written.push(path.clone());
+            path
+        };
         for (suffix, table) in &self.tables {
-            written.push(file(suffix, "csv"));
             table.write(&file(suffix, "csv"))?;
         }
         for (suffix, plot) in &self.plots {
-            written.push(file(suffix, "png"));
             plot.write(&file(suffix, "png"))?;
         }
         for (suffix, grid) in &self.pictures {
-            written.push(file(suffix, "png"));
             grid.write(&file(suffix, "png"))?;
         }
-        written.push(file("", "md"));
         write_bytes(&file("", "md"), self.markdown(study).as_bytes())?;
         Ok(written)
     }

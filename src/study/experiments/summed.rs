@@ -8,7 +8,7 @@ use crate::inverse::unknowns::Unknowns;
 use crate::math::rng::Stream;
 use crate::study::experiments::gradient::tracer;
 use crate::transport::emitters::Emitters;
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 /// Key of the paths.
 const KEY: u64 = 0x7375_6d73;
@@ -41,10 +41,8 @@ impl Paths {
         for path in 0..count {
             let frame = path % scene.cameras.len().max(1);
             let camera = &scene.cameras[frame];
-            let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
             let mut stream = Stream::new(KEY, frame as u64, 0, path as u64);
-            let pixel = stream.below((width * height) as usize) as u32;
-            let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
+            let corner = camera.corner(stream.below(camera.pixels()));
             tracer.pixel_path(camera, corner, &mut stream, &mut vertices);
             path_ends.push(vertices.len());
         }

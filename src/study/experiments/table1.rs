@@ -33,6 +33,13 @@ struct Solved {
     paper: Vec<Mark>,
 }
 
+impl Solved {
+    /// The ends by each solver, with its name.
+    fn by_solver(&self) -> [(&'static str, &[Mark]); 2] {
+        [("transport cache", &self.cache), ("paper", &self.paper)]
+    }
+}
+
 fn run(bench: &Bench) -> Result<Findings> {
     let objects = match twin(bench, Sizes::small(bench.quick))? {
         Some(twin) => vec![objects::of_twin(&twin)?],
@@ -49,36 +56,39 @@ fn run(bench: &Bench) -> Result<Findings> {
     let aims: Vec<String> = (objects.iter())
         .map(|posed| format!("{} % for \"{}\"", brief(posed.aim), posed.name))
         .collect();
-    let mut all: Vec<Solved> = Vec::new();
-    for posed in objects {
-        all.push(Solved {
+    let longer = Limits {
+        seconds: limits.seconds * PAPER_FRACTION,
+        ..limits
+    };
+    let mut all: Vec<Solved> = (objects.into_iter())
+        .map(|posed| Solved {
             posed,
             cache: Vec::new(),
             paper: Vec::new(),
-        });
-        let (cache, paper) = (bench.seeds(), 1..=PAPER_SEEDS.min(bench.seeds));
-        let solves = cache
-            .map(|seed| (seed, true))
-            .chain(paper.map(|seed| (seed, false)));
-        for (seed, by_cache) in solves {
-            let last = all.len() - 1;
-            let posed = &all[last].posed;
+        })
+        .collect();
+    for index in 0..all.len() {
+        let by_cache = bench.seeds().map(|seed| (seed, true));
+        let by_paper = (1..=PAPER_SEEDS.min(bench.seeds)).map(|seed| (seed, false));
+        for (seed, by_cache) in by_cache.chain(by_paper) {
+            let Solved {
+                posed,
+                cache,
+                paper,
+            } = &mut all[index];
             let solver = if by_cache { "transport cache" } else { "paper" };
             bench.begin(&format!("{}, {solver}, seed {seed}", posed.name))?;
-            let gauge = Evaluator::new(&posed.subject, u32::MAX).watch_object(&posed.object);
+            let gauge = Evaluator {
+                watched: Some(&posed.object),
+                ..Evaluator::new(&posed.subject, u32::MAX)
+            };
             if by_cache {
                 let settings = settings(posed, seed, bench.quick, limits.seconds);
-                let end = cached(bench, &gauge, &settings)?;
-                all[last].cache.push(end);
+                cache.push(cached(bench, &gauge, &settings)?);
             } else {
-                let longer = Limits {
-                    seconds: limits.seconds * PAPER_FRACTION,
-                    ..limits
-                };
-                let end = descend(bench, &gauge, &paper_settings(seed), longer).pop();
-                all[last].paper.extend(end);
+                paper.extend(descend(bench, &gauge, &paper_settings(seed), longer).pop());
             }
-            (bench.show)(plot(&all));
+            (bench.show)(plot(&all[..=index]));
         }
     }
     bench.go_on()?;
@@ -90,35 +100,16 @@ fn run(bench: &Bench) -> Result<Findings> {
              Seconds are those of this machine and whatever else ran on it.",
             stopping(bench.quick, &aims, limits),
             bench.seeds,
-            Limits {
-                seconds: limits.seconds * PAPER_FRACTION,
-                ..limits
-            }
-            .words(),
+            longer.words(),
             PAPER_SEEDS.min(bench.seeds),
         ),
         tables: vec![("", table(&all))],
         plots: vec![("", plot(&all))],
         summary: Summary {
-            columns: vec![
-                "object",
-                "solver",
-                "relative error of albedo in %, root mean square",
-                "each seed",
-                "floor in % (noise of the photographs)",
-                "the paper's",
-                "lamp's error in %",
-                "seconds",
-                "M rays",
-            ],
-            rows: all
-                .iter()
-                .flat_map(|s| {
-                    [
-                        row(s, "transport cache", &s.cache),
-                        row(s, "paper", &s.paper),
-                    ]
-                })
+            columns: "object | solver | relative error of albedo in %, root mean square | each seed | \
+                      floor in % (noise of the photographs) | the paper's | lamp's error in % | seconds | M rays",
+            rows: (all.iter())
+                .flat_map(|s| s.by_solver().map(|(solver, marks)| row(s, solver, marks)))
                 .collect(),
         },
         seen: all.iter().flat_map(seen).collect(),
@@ -174,20 +165,11 @@ fn mean(marks: &[Mark], value: impl Fn(&Mark) -> f64) -> f64 {
 }
 
 fn table(all: &[Solved]) -> Table {
-    let mut table = Table::new(&[
-        "object",
-        "solver",
-        "seed",
-        "relative_error",
-        "albedo_error_all",
-        "emission_error",
-        "loss",
-        "rays",
-        "seconds",
-        "floor",
-    ]);
+    let mut table = Table::new(
+        "object,solver,seed,relative_error,albedo_error_all,emission_error,loss,rays,seconds,floor",
+    );
     for solved in all {
-        for (solver, marks) in [("transport cache", &solved.cache), ("paper", &solved.paper)] {
+        for (solver, marks) in solved.by_solver() {
             for (seed, mark) in (1u64..).zip(marks) {
                 table.row(&[
                     solved.posed.object.as_str().into(),
@@ -210,22 +192,16 @@ fn table(all: &[Solved]) -> Table {
 fn plot(all: &[Solved]) -> Plot {
     let mut series = Vec::new();
     for solved in all {
-        for (solver, marks) in [("transport cache", &solved.cache), ("paper", &solved.paper)] {
+        let object = &solved.posed.object;
+        for (solver, marks) in solved.by_solver() {
             let points = (1..).zip(percents(marks));
-            series.push(Series {
-                name: format!("{}, {solver}", solved.posed.object),
-                points: points
-                    .map(|(seed, error)| [f64::from(seed), error])
-                    .collect(),
-                ..Series::default()
-            });
+            let points = points.map(|(seed, error)| [f64::from(seed), error]);
+            series.push(Series::line(format!("{object}, {solver}"), points));
         }
-        let end = solved.cache.len() as f64;
+        let target = [1.0, solved.cache.len() as f64].map(|seed| [seed, solved.posed.target]);
         series.push(Series {
-            name: format!("{}, the paper's number", solved.posed.object),
-            points: vec![[1.0, solved.posed.target], [end, solved.posed.target]],
             draw: Draw::Steps,
-            ..Series::default()
+            ..Series::line(format!("{object}, the paper's number"), target)
         });
     }
     Plot {

@@ -15,7 +15,7 @@ use crate::study::experiments::course::{cache_settings, paper_settings, solved};
 use crate::study::experiments::findings::{Findings, Grid, Summary, brief};
 use crate::study::experiments::furnished::built_in;
 use crate::study::experiments::study::{Bench, Study};
-use crate::study::experiments::subject::Subject;
+use crate::study::subject::Subject;
 use crate::transport::lit::LitScene;
 use glam::Vec3;
 use std::sync::Arc;
@@ -56,19 +56,18 @@ struct Measure {
 }
 
 fn run(bench: &Bench) -> Result<Findings> {
-    let room = match bench.subject {
-        Some(_) => None,
-        None => Some(built_in(true, bench.quick)?),
+    let room;
+    let (subject, truth) = match bench.subject {
+        Some(subject) => (subject, None),
+        None => {
+            room = built_in(true, bench.quick)?;
+            (&room.subject, Some(&room.lit))
+        }
     };
-    let subject = match (&room, bench.subject) {
-        (Some(room), _) => &room.subject,
-        (None, Some(subject)) => subject,
-        (None, None) => return Ok(Findings::default()),
-    };
-    let measure = Measure::new(subject, room.as_ref().map(|room| &room.lit));
+    let measure = Measure::new(subject, truth);
 
     // The transport cache, with one colour an object and with textures.
-    let own_light = room.is_some();
+    let own_light = truth.is_some();
     let of_objects = Settings {
         exposures: !own_light,
         outside_light: !own_light,
@@ -265,7 +264,7 @@ impl Measure {
 }
 
 fn findings(how: String, states: Vec<State>, truth: Option<Vec<Picture>>) -> Findings {
-    let mut table = Table::new(&["state", "unknowns", "psnr", "loss", "seconds", "rays"]);
+    let mut table = Table::new("state,unknowns,psnr,loss,seconds,rays");
     let mut rows = Vec::new();
     let number = |value: Option<f64>, unit: &str| {
         value.map_or("-".to_owned(), |value| format!("{}{unit}", brief(value)))
@@ -290,25 +289,20 @@ fn findings(how: String, states: Vec<State>, truth: Option<Vec<Picture>>) -> Fin
     }
     let plot = plot(&states, truth.is_some());
     let seen = seen(&states);
-    let mut grid = Grid::new(3);
     let shown = truth.and_then(|pictures| pictures.into_iter().nth(SHOWN));
-    grid.pictures
-        .extend(shown.map(|picture| ("truth".to_owned(), picture)));
+    let shown = shown.map(|picture| ("truth".to_owned(), picture));
     let pictures = states.into_iter().map(|state| (state.name, state.picture));
-    grid.pictures.extend(pictures);
+    let grid = Grid {
+        columns: 3,
+        exposure: 1.0,
+        pictures: shown.into_iter().chain(pictures).collect(),
+    };
     Findings {
         how,
         tables: vec![("", table)],
         plots: vec![("", plot)],
         summary: Summary {
-            columns: vec![
-                "state",
-                "unknowns",
-                "albedo pictures, PSNR",
-                "held-out loss",
-                "seconds",
-                "M rays",
-            ],
+            columns: "state | unknowns | albedo pictures, PSNR | held-out loss | seconds | M rays",
             rows,
         },
         seen,
@@ -319,12 +313,9 @@ fn findings(how: String, states: Vec<State>, truth: Option<Vec<Picture>>) -> Fin
 /// Accuracy of the albedo pictures over rays, by PSNR if the truth is `known`, else by loss.
 fn plot(states: &[State], known: bool) -> Plot {
     let point = |state: &State| Some([state.rays as f64, state.psnr.or(state.loss)?]);
-    let series = |name: &str, solver: &str| Series {
-        name: name.to_owned(),
-        points: (states.iter().filter(|s| s.name.starts_with(solver)))
-            .filter_map(point)
-            .collect(),
-        ..Series::default()
+    let series = |name: &str, solver: &str| {
+        let states = states.iter().filter(|s| s.name.starts_with(solver));
+        Series::line(name, states.filter_map(point))
     };
     Plot {
         title: "Textures".to_owned(),

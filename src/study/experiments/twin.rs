@@ -14,7 +14,7 @@ use crate::scene::camera::Camera;
 use crate::study::experiments::box_room;
 use crate::study::experiments::course::{cache_settings, solved};
 use crate::study::experiments::study::Bench;
-use crate::study::experiments::subject::Subject;
+use crate::study::subject::Subject;
 use crate::transport::material::Material;
 use glam::Vec3;
 
@@ -64,23 +64,16 @@ impl Sizes {
     }
 }
 
-/// The room for a study of one room: the twin of its capture, or its own room with the description `words`.
+/// The room for a study of one room: the twin of its capture, or the standard box room, photographed by `rendering`.
 ///
 /// # Errors
 /// As [`twin`].
-pub fn studied(
-    bench: &Bench,
-    words: &str,
-    own: impl FnOnce() -> (Room, Rendering),
-) -> Result<Studied> {
+pub fn studied(bench: &Bench, rendering: Rendering) -> Result<Studied> {
     let twin = twin(bench, Sizes::small(bench.quick))?;
-    Ok(twin.unwrap_or_else(|| {
-        let (room, rendering) = own();
-        Studied {
-            room,
-            rendering,
-            words: words.to_owned(),
-        }
+    Ok(twin.unwrap_or_else(|| Studied {
+        room: box_room::standard(),
+        rendering,
+        words: format!("A box room of mean albedo {}", box_room::ALBEDO),
     }))
 }
 
@@ -181,7 +174,7 @@ fn rendering(cameras: &[Camera], sizes: Sizes) -> Rendering {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::experiments::box_room::{box_room, photographed};
+    use crate::scene::geometry::Hit;
     use crate::study::trade::Metric;
     use std::time::Duration;
 
@@ -199,11 +192,11 @@ mod tests {
 
     #[test]
     fn a_twin_has_the_captures_views_and_nearly_its_photographs_and_its_truth_is_its_own() {
-        let mut subject = photographed("room", 0.5, 0.25, true).expect("a room");
+        let mut subject = box_room::photographed(true).expect("a room");
         subject.metric = Metric::HeldOut;
         let twin = twin(&bench(&subject), Sizes::small(true));
         let twin = twin.expect("solved").expect("on a capture");
-        let original = box_room("room", 0.5, 0.25);
+        let original = box_room::standard();
         for (view, other) in twin.room.views.iter().zip(&original.views) {
             assert!(view.pose.center.distance(other.pose.center) < 1e-5);
             assert!((view.half_field - other.half_field).abs() < 1e-12);
@@ -211,12 +204,7 @@ mod tests {
         assert_eq!(twin.room.mesh.triangles, original.mesh.triangles);
         let truth = box_room::truth(&original);
         for (material, wanted) in twin.room.materials.iter().zip(&truth.albedo) {
-            let found = material.albedo_at(&crate::scene::geometry::Hit {
-                t: 0.0,
-                triangle: 0,
-                b1: 0.0,
-                b2: 0.0,
-            });
+            let found = material.albedo_at(&Hit::default());
             assert!((found - *wanted).abs().max_element() < 0.1 || material.emission != Vec3::ZERO);
         }
         let photographed = twin.photographed().expect("a room");
@@ -233,7 +221,7 @@ mod tests {
 
     #[test]
     fn a_dark_capture_has_no_twin() {
-        let mut room = box_room("dark", 0.5, 0.25);
+        let mut room = box_room::standard();
         (room.materials.iter_mut()).for_each(|material| material.emission = Vec3::ZERO);
         let subject = Subject::of_room(&room, &box_room::rendering(true)).expect("a room");
         let refused = twin(&bench(&subject), Sizes::small(true)).expect_err("no lamp");

@@ -2,8 +2,6 @@
 
 use crate::capture::exposure::{Exposure, Vignetting};
 use crate::compose::backdrop::Backdrop;
-use crate::compose::denoise::denoised;
-use crate::compose::insert::{Insertion, Layers};
 use crate::compose::naive::{Pasted, harmonics_of_photographs};
 use crate::compose::object::ObjectModel;
 use crate::compose::placement::{PlacedObject, Placement};
@@ -16,14 +14,13 @@ use crate::math::stats::quantile;
 use crate::room::generated::Family;
 use crate::room::shape::Modeller;
 use crate::scene::Scene;
-use crate::study::experiments::{Cylinder, chair, places, up};
-use crate::study::families::plan::Plan;
+use crate::study::experiments::{Cylinder, chair, insert, places, up, upright};
+use crate::study::families::Plan;
 use crate::study::families::score::{Solved, solved};
-use crate::transport::denoise::Denoiser;
 use crate::transport::lit::LitScene;
 use crate::transport::material::Material;
 use crate::transport::path::PathOptions;
-use glam::{DAffine3, DQuat, DVec3, Vec2, Vec3};
+use glam::{DAffine3, Vec3};
 use std::sync::Arc;
 
 /// The chair's reflectance.
@@ -81,22 +78,18 @@ pub fn composite(family: Family, seed: u64, plan: &Plan) -> Result<Option<Compos
     let Some(chair) = standing(&truth)? else {
         return Ok(None);
     };
-    let true_chair = [Arc::new(PlacedObject::new(
-        chair.clone(),
-        &Placement::new("chair", None),
-        &truth.scene,
-    )?)];
+    let true_chair = [placed(&chair, &truth.scene)?];
     let frames = most_seen(&truth, &true_chair);
     let scores = (frames.iter())
         .map(|&frame| scores(&solved, frame, &truth, &true_chair, &chair))
         .collect::<Result<Vec<_>>>()?;
     let count = scores.len() as f64;
     let mean = |score: fn(&Scores) -> f64| scores.iter().map(score).sum::<f64>() / count;
-    let changed: Vec<AroundScores> = scores.iter().filter_map(|s| s.around).collect();
-    let around = |score: fn(&AroundScores) -> f64, weight: fn(&AroundScores) -> f64| {
-        let sum = |of: fn(&AroundScores) -> f64| changed.iter().map(of).sum::<f64>();
-        (!changed.is_empty()).then(|| sum(score) / sum(weight))
-    };
+    let changed: Vec<[f64; 4]> = scores.iter().filter_map(|s| s.around).collect();
+    let [shadow, untouched, product, square] =
+        [0, 1, 2, 3].map(|score| changed.iter().map(|around| around[score]).sum::<f64>());
+    let frames = changed.len() as f64;
+    let around = |mean: f64| (!changed.is_empty()).then_some(mean);
     Ok((!scores.is_empty()).then(|| CompositeRow {
         family,
         seed,
@@ -104,9 +97,9 @@ pub fn composite(family: Family, seed: u64, plan: &Plan) -> Result<Option<Compos
         chair: mean(|s| s.chair),
         naive: mean(|s| s.naive),
         brightness: mean(|s| s.brightness),
-        shadow: around(|b| b.shadow, |_| 1.0),
-        untouched: around(|b| b.untouched, |_| 1.0),
-        slope: around(|b| b.slope[0], |b| b.slope[1]),
+        shadow: around(shadow / frames),
+        untouched: around(untouched / frames),
+        slope: around(product / square),
     }))
 }
 
@@ -177,17 +170,9 @@ impl Decision {
 
 /// The rows as a table.
 pub fn table(rows: &[CompositeRow]) -> Table {
-    let mut table = Table::new(&[
-        "family",
-        "seed",
-        "seconds",
-        "chair_psnr",
-        "naive_psnr",
-        "brightness",
-        "shadow_psnr",
-        "untouched_psnr",
-        "slope",
-    ]);
+    let mut table = Table::new(
+        "family,seed,seconds,chair_psnr,naive_psnr,brightness,shadow_psnr,untouched_psnr,slope",
+    );
     for row in rows {
         table.row(&[
             row.family.name().into(),
@@ -212,13 +197,9 @@ fn standing(truth: &LitScene) -> Result<Option<Arc<ObjectModel>>> {
         return Ok(None);
     };
     let at = (place + up * LIFT).as_dvec3() + scene.origin;
-    let upright = DAffine3::from_quat(DQuat::from_rotation_arc(
-        DVec3::Y,
-        up.as_dvec3().normalize_or(DVec3::Y),
-    ));
     let mut modeller = Modeller::default();
     modeller.object("chair");
-    modeller.placed(DAffine3::from_translation(at) * upright, chair);
+    modeller.placed(DAffine3::from_translation(at) * upright(up), chair);
     let mesh = modeller.mesh;
     let corners = (mesh.triangles.iter())
         .map(|corners| corners.map(|i| mesh.positions[i as usize]))
@@ -227,16 +208,19 @@ fn standing(truth: &LitScene) -> Result<Option<Arc<ObjectModel>>> {
     ObjectModel::from_corners("chair", corners, material).map(|model| Some(Arc::new(model)))
 }
 
+/// The chair where it is modelled.
+fn placed(chair: &Arc<ObjectModel>, scene: &Scene) -> Result<Arc<PlacedObject>> {
+    PlacedObject::new(chair.clone(), &Placement::new("chair", None), scene).map(Arc::new)
+}
+
 /// The photographs that see most of the chair, without those that it nearly fills.
 fn most_seen(truth: &Arc<LitScene>, chair: &[Arc<PlacedObject>]) -> Vec<usize> {
     let world = FurnishedScene::new(truth, chair);
     let seen = |frame: usize| {
         let camera = &truth.scene.cameras[frame];
-        let [width, height] = [camera.intrinsics.width, camera.intrinsics.height];
-        let pixels = (0..height).flat_map(|y| (0..width).map(move |x| [x, y]));
-        let rays = pixels.map(|[x, y]| camera.ray(Vec2::new(x as f32, y as f32) + 0.5));
+        let rays = (0..camera.pixels()).map(|pixel| camera.ray(camera.corner(pixel) + 0.5));
         let seen = rays.filter(|ray| world.sees_object(ray)).count();
-        seen as f64 / f64::from(width * height)
+        seen as f64 / camera.pixels() as f64
     };
     let mut frames: Vec<(f64, usize)> = (0..truth.scene.cameras.len())
         .map(|frame| (seen(frame), frame))
@@ -253,34 +237,9 @@ struct Scores {
     chair: f64,
     naive: f64,
     brightness: f64,
-    /// Scores beside the chair, if it changes any pixel there.
-    around: Option<AroundScores>,
-}
-
-/// Scores over the shadow and bleed.
-#[derive(Debug, Clone, Copy)]
-struct AroundScores {
-    shadow: f64,
-    untouched: f64,
-    /// Sums of the composite's change times the true change, and of the squared true change.
-    slope: [f64; 2],
-}
-
-/// The denoised composite and its layers, of two halves with their own seeds.
-fn insertion(
-    lit: &Arc<LitScene>,
-    backdrop: &Backdrop,
-    objects: &[Arc<PlacedObject>],
-    seeds: [u64; 2],
-    samples: u32,
-) -> (Picture, Layers) {
-    let [a, b] = seeds.map(|seed| {
-        let (lit, objects) = (lit.clone(), objects.to_vec());
-        let mut half = Insertion::new(backdrop.clone(), lit, objects, PathOptions::default(), seed);
-        half.pass(samples / 2);
-        half
-    });
-    denoised([&a, &b], Denoiser::Builtin)
+    /// If the chair changes any pixel beside it: PSNR of the composite over these and of the photograph without the chair, and sums
+    /// of the composite's change times the true change and of the squared true change.
+    around: Option<[f64; 4]>,
 }
 
 /// The exposure and vignetting that bring a render of the empty room nearest to its photograph, by least squares over valid pixels.
@@ -329,7 +288,8 @@ fn scores(
     let backdrop =
         |scene: &Scene, exposure| Backdrop::new(frame, &scene.cameras[frame], photograph, exposure);
     let true_backdrop = backdrop(&truth.scene, Exposure::default())?;
-    let (_, layers) = insertion(truth, &true_backdrop, true_chair, [2, 4], SAMPLES[1]);
+    let full = PathOptions::default();
+    let (_, layers) = insert(truth, &true_backdrop, true_chair, full, [2, 4], SAMPLES[1]);
     let pixels = &photograph.pixels;
     let valid: Vec<bool> = (0..pixels.len())
         .map(|i| photograph.is_usable(i) && !photograph.is_saturated(i))
@@ -345,14 +305,10 @@ fn scores(
 
     // The composites.
     let scene = &problem.scene;
-    let placed = [Arc::new(PlacedObject::new(
-        chair.clone(),
-        &Placement::new("chair", None),
-        scene,
-    )?)];
+    let placed = [placed(chair, scene)?];
     let lit = Arc::new(estimate.lit(scene));
     let plain = backdrop(scene, estimate.exposure(frame))?;
-    let (ours, _) = insertion(&lit, &plain, &placed, [1, 3], SAMPLES[0]);
+    let (ours, _) = insert(&lit, &plain, &placed, full, [1, 3], SAMPLES[0]);
     let pictures: Vec<Picture> = (problem.photographs.iter()).map(|p| p.picture()).collect();
     let light = harmonics_of_photographs(scene.cameras.iter().zip(&pictures));
     let naive = Pasted::new(&plain, &lit, &placed, &[light], Exposure::default());
@@ -384,23 +340,20 @@ fn scores(
         indices.iter().map(|&i| f64::from(value(i))).sum()
     };
     let ours_at = |i: usize| ours.pixels[i];
-    let slope = || {
-        let ours = |i: usize| (ours_at(i) - pixels[i]).dot(change_at(i));
-        [
-            sum(&ours, &around),
-            sum(&|i| change_at(i).length_squared(), &around),
-        ]
-    };
+    let product = |i: usize| (ours_at(i) - pixels[i]).dot(change_at(i));
     let bright =
         |picture: &dyn Fn(usize) -> Vec3| sum(&|i| shown(picture(i)).element_sum(), &covered);
     Ok(Scores {
         chair: psnr(&covered, &ours_at, &truth_at),
         naive: psnr(&covered, &|i| naive.pixels[i], &truth_at),
         brightness: bright(&ours_at) / bright(&truth_at),
-        around: (!around.is_empty()).then(|| AroundScores {
-            shadow: psnr(&around, &ours_at, &true_at),
-            untouched: psnr(&around, &|i| pixels[i], &true_at),
-            slope: slope(),
+        around: (!around.is_empty()).then(|| {
+            [
+                psnr(&around, &ours_at, &true_at),
+                psnr(&around, &|i| pixels[i], &true_at),
+                sum(&product, &around),
+                sum(&|i| change_at(i).length_squared(), &around),
+            ]
         }),
     })
 }

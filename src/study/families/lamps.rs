@@ -47,16 +47,10 @@ mod tests {
 
     fn object(emission: f64, known: f64) -> (String, ObjectErrors) {
         let errors = ObjectErrors {
-            pixels: 0,
             emitter: known > 0.0,
-            textured: false,
-            scored: false,
-            albedo: [0.0; 3],
-            albedo_true: None,
-            albedo_rel: None,
             emission: [emission; 3],
             emission_true: [known; 3],
-            emission_rel: None,
+            ..ObjectErrors::default()
         };
         (String::new(), errors)
     }

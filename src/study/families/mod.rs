@@ -5,7 +5,6 @@
 
 mod composite;
 mod lamps;
-mod plan;
 mod plot;
 mod row;
 mod score;
@@ -13,15 +12,28 @@ mod segments;
 mod summary;
 
 pub use composite::{CompositeRow, Decision, composite, table};
-pub use plan::Plan;
 pub use plot::plot;
 pub use row::{Row, Rows};
 pub use score::measure;
 pub use summary::{Quantiles, Summary, summarize};
 
 use crate::error::{Error, Result};
+use crate::inverse::settings::Preset;
 use crate::room::generated::Family;
 use std::path::Path;
+
+/// Which rooms to solve, and how.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// The families, one after the other.
+    pub families: Vec<Family>,
+    /// The seeds of each family's rooms, and of their solves.
+    pub seeds: Vec<u64>,
+    /// Width and height of the photographs in pixels.
+    pub size: [u32; 2],
+    /// The preset of every solve.
+    pub preset: Preset,
+}
 
 /// Progress of [`run`].
 #[derive(Debug)]

@@ -4,32 +4,15 @@ use crate::error::{Error, Result};
 use crate::export::atomic::write_bytes;
 use crate::export::table::{Cell, Table};
 use crate::room::generated::Family;
-use crate::study::families::plan::Plan;
+use crate::study::families::Plan;
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-const COLUMNS: [&str; 19] = [
-    "relit",
-    "preset",
-    "width",
-    "height",
-    "family",
-    "seed",
-    "seconds",
-    "objects",
-    "albedo_mae",
-    "albedo_rel_median",
-    "albedo_psnr",
-    "lamps_true",
-    "lamps_found",
-    "lamps_false",
-    "albedos",
-    "coverage_1",
-    "coverage_2",
-    "rays",
-    "albedo_factor",
-];
+const COLUMNS: &str = "relit,preset,width,height,family,seed,seconds,objects,albedo_mae,albedo_rel_median,albedo_psnr,\
+    lamps_true,lamps_found,lamps_false,albedos,coverage_1,coverage_2,rays,albedo_factor";
+/// Number of [`COLUMNS`].
+const COUNT: usize = 19;
 
 /// Comparison of a solved room with its truth.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,7 +63,7 @@ impl Row {
             && self.size == plan.size
     }
 
-    fn cells(&self) -> [Cell; COLUMNS.len()] {
+    fn cells(&self) -> [Cell; COUNT] {
         [
             self.relit.as_str().into(),
             self.preset.as_str().into(),
@@ -107,7 +90,7 @@ impl Row {
     /// Parses a line; `None` if it is incomplete.
     fn parse(line: &str) -> Option<Self> {
         let fields: Vec<&str> = line.split(',').collect();
-        let fields: [&str; COLUMNS.len()] = fields.try_into().ok()?;
+        let fields: [&str; COUNT] = fields.try_into().ok()?;
         let optional = |text: &str| match text {
             "" => Some(None),
             text => text.parse::<f64>().ok().map(Some),
@@ -155,7 +138,7 @@ impl Rows {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
             Err(error) => return Err(Error::io(&path, &error)),
         };
-        let mut table = Table::new(&COLUMNS);
+        let mut table = Table::new(COLUMNS);
         let mut rows = Vec::new();
         if !text.is_empty() {
             let another = |line: usize| {
@@ -167,7 +150,7 @@ impl Rows {
             };
             let mut lines = text.split_inclusive('\n').enumerate();
             let header = lines.next().map(|(_, line)| line.trim_end());
-            if header != table.as_str().lines().next() {
+            if header != Some(COLUMNS) {
                 return Err(another(1));
             }
             for (index, line) in lines {

@@ -16,8 +16,8 @@ use crate::scene::Scene;
 use crate::scene::prepare::prepare;
 use crate::study::albedo_pictures;
 use crate::study::evaluate::{ObjectErrors, Reference};
+use crate::study::families::Plan;
 use crate::study::families::lamps;
-use crate::study::families::plan::Plan;
 use crate::study::families::row::Row;
 use crate::study::families::segments;
 use std::sync::Arc;
@@ -86,7 +86,11 @@ pub fn measure(family: Family, seed: u64, plan: &Plan) -> Result<Row> {
     let reference = Reference::new(truth, &capture, scene, &problem.photographs);
     let errors = reference.errors(scene, estimate);
     let lamps = lamps::count(&errors.per_object, room.lit.outside.as_deref());
-    let coverage = Coverage::of(scene, estimate, &errors.per_object);
+    let claimed = claimed(scene, estimate, &errors.per_object);
+    let coverage = |errors: f64| {
+        let within = claimed.iter().filter(|(off, error)| *off <= errors * error);
+        (!claimed.is_empty()).then(|| within.count() as f64 / claimed.len() as f64)
+    };
     Ok(Row {
         relit: env!("CARGO_PKG_VERSION").to_owned(),
         preset: plan.preset.word().to_owned(),
@@ -101,9 +105,9 @@ pub fn measure(family: Family, seed: u64, plan: &Plan) -> Result<Row> {
         lamps_true: lamps.true_count,
         lamps_found: lamps.found,
         lamps_false: lamps.false_count,
-        albedos: coverage.albedos,
-        coverage_1: coverage.fraction(0),
-        coverage_2: coverage.fraction(1),
+        albedos: claimed.len() as u64,
+        coverage_1: coverage(1.0),
+        coverage_2: coverage(2.0),
         rays: solution.progress.rays,
         albedo_factor: common_factor(&errors.per_object),
     })
@@ -130,39 +134,27 @@ impl Observer for Unwatched {
     }
 }
 
-/// Number of albedos within one and within two of their reported standard errors.
-#[derive(Debug, Default)]
-struct Coverage {
-    albedos: u64,
-    within: [u64; 2],
-}
-
-impl Coverage {
-    /// Counts the channels of all objects whose albedo is scored and reported as determined.
-    fn of(scene: &Scene, estimate: &Estimate, errors: &[(String, ObjectErrors)]) -> Self {
-        let mut coverage = Self::default();
-        for (name, errors) in errors.iter().filter(|(_, errors)| errors.scored) {
-            let place = scene.objects.iter().position(|object| object.name == *name);
-            let estimated = place.and_then(|place| estimate.objects.get(place));
-            let Some((estimated, known)) = estimated
-                .filter(|object| object.albedo_identifiable)
-                .zip(errors.albedo_true)
-            else {
-                continue;
-            };
-            for (channel, known) in known.into_iter().enumerate() {
-                let off = (f64::from(estimated.albedo[channel]) - known).abs();
-                let error = f64::from(estimated.albedo_stderr[channel]);
-                coverage.albedos += 1;
-                for (within, errors) in coverage.within.iter_mut().zip([1.0, 2.0]) {
-                    *within += u64::from(off <= errors * error);
-                }
-            }
-        }
-        coverage
-    }
-
-    fn fraction(&self, which: usize) -> Option<f64> {
-        (self.albedos > 0).then(|| self.within[which] as f64 / self.albedos as f64)
-    }
+/// Albedos, by channel, of all objects whose albedo is scored and reported as determined: how far off each is, and its reported
+/// standard error.
+fn claimed(
+    scene: &Scene,
+    estimate: &Estimate,
+    errors: &[(String, ObjectErrors)],
+) -> Vec<(f64, f64)> {
+    let scored = errors.iter().filter(|(_, errors)| errors.scored);
+    let known = scored.filter_map(|(name, errors)| {
+        let place = scene
+            .objects
+            .iter()
+            .position(|object| object.name == *name)?;
+        let estimated = estimate.objects.get(place)?;
+        Some((estimated, errors.albedo_true?)).filter(|_| estimated.albedo_identifiable)
+    });
+    let channels = known.flat_map(|(estimated, known)| {
+        [0, 1, 2].map(|c| {
+            let off = (f64::from(estimated.albedo[c]) - known[c]).abs();
+            (off, f64::from(estimated.albedo_stderr[c]))
+        })
+    });
+    channels.collect()
 }

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::export::atomic::write_bytes;
 use crate::math::stats::quantile;
 use crate::room::generated::Family;
-use crate::study::families::plan::Plan;
+use crate::study::families::Plan;
 use crate::study::families::row::Row;
 use crate::study::machine::Machine;
 use serde::Serialize;

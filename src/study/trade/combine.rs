@@ -52,30 +52,24 @@ fn mean(curves: &[&Curve]) -> Vec<Point> {
 
 /// Mean of the curves' last points at or before a time.
 fn at(curves: &[&Curve], seconds: f64) -> Point {
-    let mut logs = Moments::default();
-    let mut reported = Moments::default();
-    let (mut rays, mut iterations) = (Moments::default(), Moments::default());
-    for curve in curves {
-        let after = curve.points.partition_point(|p| p.seconds <= seconds);
-        let Some(point) = curve.points.get(after.saturating_sub(1)) else {
-            continue;
-        };
-        // The logarithm of zero error is replaced by that of the smallest number.
-        logs.push(point.error.max(f64::MIN_POSITIVE).ln());
-        if let Some(claim) = point.reported {
-            reported.push(claim);
-        }
-        rays.push(point.rays as f64);
-        iterations.push(point.iterations as f64);
-    }
+    let points: Vec<&Point> = (curves.iter())
+        .filter_map(|curve| {
+            let after = curve.points.partition_point(|p| p.seconds <= seconds);
+            curve.points.get(after.saturating_sub(1))
+        })
+        .collect();
+    let over = |value: fn(&Point) -> f64| points.iter().map(|p| value(p)).collect::<Moments>();
+    // The logarithm of zero error is replaced by that of the smallest number.
+    let logs = over(|point| point.error.max(f64::MIN_POSITIVE).ln());
+    let reported: Moments = points.iter().filter_map(|point| point.reported).collect();
     let deviation = logs.variance().sqrt();
     Point {
         seconds,
         error: logs.mean.exp(),
         spread: Some([logs.mean - deviation, logs.mean + deviation].map(f64::exp)),
         reported: (reported.count == curves.len() as u64).then_some(reported.mean),
-        rays: rays.mean as u64,
-        iterations: iterations.mean as u64,
+        rays: over(|point| point.rays as f64).mean as u64,
+        iterations: over(|point| point.iterations as f64).mean as u64,
         pareto: false,
     }
 }
@@ -83,28 +77,10 @@ fn at(curves: &[&Curve], seconds: f64) -> Point {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inverse::settings::Settings;
+    use crate::inverse::settings::Preset;
 
     fn curve(points: &[[f64; 2]]) -> Curve {
-        Curve {
-            name: "balanced".into(),
-            is_preset: true,
-            settings: Settings::default(),
-            ended: None,
-            rejected: 1,
-            points: points
-                .iter()
-                .map(|&[seconds, error]| Point {
-                    seconds,
-                    error,
-                    spread: None,
-                    reported: Some(error),
-                    rays: 10,
-                    iterations: 2,
-                    pareto: false,
-                })
-                .collect(),
-        }
+        Curve::through(Preset::Balanced, points)
     }
 
     #[test]

@@ -80,38 +80,11 @@ pub fn against_paper(curves: &[Curve]) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inverse::settings::Settings;
-
-    fn curve(preset: Preset, points: &[[f64; 2]]) -> Curve {
-        Curve {
-            name: preset.word().to_owned(),
-            is_preset: true,
-            settings: Settings {
-                preset,
-                ..Settings::default()
-            },
-            ended: None,
-            rejected: 0,
-            points: points
-                .iter()
-                .map(|&[seconds, error]| Point {
-                    seconds,
-                    error,
-                    spread: None,
-                    reported: None,
-                    rays: 0,
-                    iterations: 0,
-                    pareto: false,
-                })
-                .collect(),
-        }
-    }
-
     #[test]
     fn times_to_the_same_error_are_compared() {
         let curves = [
-            curve(Preset::Balanced, &[[0.5, 0.05], [1.0, 0.01], [4.0, 0.003]]),
-            curve(
+            Curve::through(Preset::Balanced, &[[0.5, 0.05], [1.0, 0.01], [4.0, 0.003]]),
+            Curve::through(
                 Preset::Paper,
                 &[[1.0, 0.5], [30.0, 0.02], [40.0, 0.009], [50.0, 0.011]],
             ),
@@ -124,8 +97,8 @@ mod tests {
             ]
         );
         let curves = [
-            curve(Preset::Balanced, &[[1.0, 0.01]]),
-            curve(Preset::Paper, &[[1.0, 0.5], [30.0, 0.1]]),
+            Curve::through(Preset::Balanced, &[[1.0, 0.01]]),
+            Curve::through(Preset::Paper, &[[1.0, 0.5], [30.0, 0.1]]),
         ];
         let findings = against_paper(&curves);
         assert!(findings[0].ends_with("paper not within 30.0 s: more than 30.0 times faster"));

@@ -1,5 +1,7 @@
 //! Curves of error over time.
 
+#[cfg(test)]
+use crate::inverse::settings::Preset;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::Termination;
 use serde::{Deserialize, Serialize};
@@ -39,6 +41,34 @@ pub struct Curve {
     pub rejected: u64,
     /// In order of seconds.
     pub points: Vec<Point>,
+}
+
+#[cfg(test)]
+impl Curve {
+    /// A preset's curve through (seconds, error) points.
+    pub(super) fn through(preset: Preset, points: &[[f64; 2]]) -> Self {
+        Self {
+            name: preset.word().to_owned(),
+            is_preset: true,
+            settings: Settings {
+                preset,
+                ..Settings::default()
+            },
+            ended: None,
+            rejected: 1,
+            points: (points.iter())
+                .map(|&[seconds, error]| Point {
+                    seconds,
+                    error,
+                    spread: None,
+                    reported: Some(error),
+                    rays: 10,
+                    iterations: 2,
+                    pareto: false,
+                })
+                .collect(),
+        }
+    }
 }
 
 /// A measurement of a solve.

@@ -6,7 +6,7 @@ use crate::inverse::estimate::{Estimate, ObjectEstimate};
 use crate::inverse::solve;
 use crate::inverse::solver::{Control, Observer, Progress, Solution, Termination};
 use crate::study::trade::curve::{Curve, Point};
-use crate::study::trade::metric::{Metric, SolveMetric};
+use crate::study::trade::metric::{ErrorOf, Metric};
 use crate::study::trade::plan::Run;
 use std::time::{Duration, Instant};
 
@@ -62,8 +62,7 @@ pub fn watch(
     stopped: &dyn Fn() -> bool,
 ) -> Result<(Curve, Solution)> {
     let mut watch = Watch {
-        problem,
-        metric: metric.for_solve(problem, &run.settings),
+        error_of: metric.for_solve(problem, &run.settings),
         spacing: metric.spacing(),
         deadline,
         stopped,
@@ -93,8 +92,7 @@ pub fn watch(
 
 /// Observer that measures a running solve from time to time.
 struct Watch<'a> {
-    problem: &'a Problem,
-    metric: SolveMetric<'a>,
+    error_of: ErrorOf<'a>,
     spacing: f64,
     deadline: Instant,
     stopped: &'a dyn Fn() -> bool,
@@ -113,8 +111,7 @@ impl Watch<'_> {
             return;
         }
         self.measured.clone_from(&estimate.objects);
-        let error = self.metric.error(self.problem, estimate);
-        match error.filter(|error| error.is_finite()) {
+        match (self.error_of)(estimate).filter(|error| error.is_finite()) {
             Some(error) => self.points.push(Point {
                 seconds: progress.seconds,
                 error,
@@ -136,9 +133,9 @@ impl Observer for Watch<'_> {
             self.add_point(progress, estimate);
         }
         self.late = Instant::now() >= self.deadline;
-        if self.late || (self.stopped)() {
-            return Control::Stop;
+        match self.late || (self.stopped)() {
+            true => Control::Stop,
+            false => Control::Continue,
         }
-        Control::Continue
     }
 }

@@ -12,6 +12,9 @@ const PIXELS: usize = 1000;
 /// Samples for each of these pixels.
 const SAMPLES: u64 = 16;
 
+/// The error of an estimate; `None` if nothing can be compared.
+pub(super) type ErrorOf<'a> = Box<dyn Fn(&Estimate) -> Option<f64> + 'a>;
+
 /// How the error of estimates is measured.
 #[derive(Debug, Clone)]
 pub enum Metric {
@@ -19,12 +22,6 @@ pub enum Metric {
     Truth(Box<Reference>),
     /// On held-out pixels, the same for all solves.
     HeldOut,
-}
-
-/// Measures the estimates of one solve.
-pub(super) enum SolveMetric<'a> {
-    Truth(&'a Reference),
-    HeldOut(LossProbe),
 }
 
 impl Metric {
@@ -45,24 +42,20 @@ impl Metric {
     }
 
     /// Prepares measuring the estimates of a solve with these parameters.
-    pub(super) fn for_solve(&self, problem: &Problem, settings: &Settings) -> SolveMetric<'_> {
+    pub(super) fn for_solve<'a>(
+        &'a self,
+        problem: &'a Problem,
+        settings: &Settings,
+    ) -> ErrorOf<'a> {
         match self {
-            Self::Truth(reference) => SolveMetric::Truth(reference),
+            Self::Truth(reference) => {
+                Box::new(move |estimate| reference.errors(&problem.scene, estimate).albedo_mae)
+            }
             Self::HeldOut => {
                 let bounces = settings.max_bounces();
                 let probe = LossProbe::new(problem, settings, PIXELS, SAMPLES, bounces);
-                SolveMetric::HeldOut(probe)
+                Box::new(move |estimate| probe.held_out(problem, estimate).0)
             }
-        }
-    }
-}
-
-impl SolveMetric<'_> {
-    /// The error; `None` if nothing can be compared.
-    pub fn error(&self, problem: &Problem, estimate: &Estimate) -> Option<f64> {
-        match self {
-            Self::Truth(reference) => reference.errors(&problem.scene, estimate).albedo_mae,
-            Self::HeldOut(probe) => probe.held_out(problem, estimate).0,
         }
     }
 }

@@ -5,7 +5,6 @@
 pub mod combine;
 pub mod compare;
 mod curve;
-mod file;
 pub mod front;
 mod measure;
 mod metric;
@@ -13,7 +12,6 @@ pub mod plan;
 pub mod plot;
 mod record;
 pub mod rooms;
-mod words;
 
 pub use curve::{Curve, Measure, Point};
 pub use measure::{SolveEvent, measure, watch};

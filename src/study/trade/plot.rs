@@ -14,10 +14,8 @@ pub fn plot(trade: &Trade) -> Plot {
     // Presets as curves, variations as dots.
     let mut series: Vec<Series> = presets()
         .map(|curve| Series {
-            name: curve.name.clone(),
-            points: points(&curve.points),
             band: (curve.points.iter()).filter_map(|p| p.spread).collect(),
-            draw: Draw::Line,
+            ..Series::line(&curve.name, points(&curve.points))
         })
         .filter(|series| !series.points.is_empty())
         .collect();
@@ -25,17 +23,13 @@ pub fn plot(trade: &Trade) -> Plot {
     let varied: Vec<[f64; 2]> = varied.flat_map(|curve| points(&curve.points)).collect();
     if !varied.is_empty() {
         series.push(Series {
-            name: "one setting changed".to_owned(),
-            points: varied,
-            band: Vec::new(),
             draw: Draw::Dots,
+            ..Series::line("one setting changed", varied)
         });
     }
     series.push(Series {
-        name: "Pareto front".to_owned(),
-        points: front(&trade.curves),
-        band: Vec::new(),
         draw: Draw::Steps,
+        ..Series::line("Pareto front", front(&trade.curves))
     });
 
     let ends = presets().filter_map(|curve| {
@@ -51,13 +45,13 @@ pub fn plot(trade: &Trade) -> Plot {
         x: Axis::logarithmic("seconds of solving"),
         y: Axis::logarithmic(trade.measure.label()),
         series,
-        marks: Vec::new(),
         labels: ends.collect(),
+        ..Plot::default()
     }
 }
 
 /// The points on the front, in order of seconds.
-pub fn front(curves: &[Curve]) -> Vec<[f64; 2]> {
+fn front(curves: &[Curve]) -> Vec<[f64; 2]> {
     let all = curves.iter().flat_map(|curve| &curve.points);
     let mut front: Vec<[f64; 2]> = all
         .filter(|point| point.pareto)

@@ -1,11 +1,22 @@
-//! A measurement of error over time.
+//! A measurement of error over time: trade.json, trade.csv and trade.png, and as text.
 
+use crate::error::{Error, Result};
+use crate::export::atomic::write_bytes;
+use crate::export::table::{Cell, Table};
 use crate::study::machine::Machine;
-use crate::study::trade::compare;
-use crate::study::trade::curve::{Curve, Measure};
-use crate::study::trade::front;
+use crate::study::trade::curve::{Curve, Measure, Point};
+use crate::study::trade::{compare, front, plot};
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 use std::time::Duration;
+
+/// The file with all data.
+const JSON: &str = "trade.json";
+/// Largest trade.json that is read, in bytes.
+const MAX_BYTES: u64 = 1 << 28;
+
+/// Columns of trade.csv; the last three are constant.
+const COLUMNS: &str = "curve,preset,seconds,error,error_low,error_high,reported_error,rays,iterations,pareto,measure,threads,cpu";
 
 /// Measured curves of error over time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -60,4 +71,107 @@ impl Trade {
             findings,
         }
     }
+
+    /// Writes trade.json, trade.csv and trade.png into a folder.
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<()> {
+        plot::plot(self).write(&folder.join("trade.png"))?;
+        self.table().write(&folder.join("trade.csv"))?;
+        let path = folder.join(JSON);
+        let text = serde_json::to_string_pretty(self)
+            .map_err(|error| Error::file(&path, error, "nothing was written there"))?;
+        write_bytes(&path, text.as_bytes())
+    }
+
+    /// Reads trade.json from a folder; `None` if it does not exist.
+    ///
+    /// # Errors
+    /// The file cannot be read or is no trade.json of this version.
+    pub fn read(folder: &Path) -> Result<Option<Self>> {
+        let path = folder.join(JSON);
+        let length = match path.metadata() {
+            Ok(metadata) => metadata.len(),
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+            Err(error) => return Err(Error::io(&path, &error)),
+        };
+        let measure_again = "measure again with relit trade";
+        if length > MAX_BYTES {
+            return Err(Error::file(&path, "is too long", measure_again));
+        }
+        let bytes = std::fs::read(&path).map_err(|error| Error::io(&path, &error))?;
+        let trade = serde_json::from_slice(&bytes);
+        let trade = trade.map_err(|error| Error::file(&path, error, measure_again))?;
+        Ok(Some(trade))
+    }
+
+    /// The table, one row for each point.
+    pub fn table(&self) -> Table {
+        let mut table = Table::new(COLUMNS);
+        for curve in &self.curves {
+            for point in &curve.points {
+                table.row(&self.row(curve, point));
+            }
+        }
+        table
+    }
+
+    fn row(&self, curve: &Curve, point: &Point) -> [Cell; 13] {
+        [
+            curve.name.as_str().into(),
+            curve.settings.preset.word().into(),
+            point.seconds.into(),
+            point.error.into(),
+            point.spread.map(|s| s[0]).into(),
+            point.spread.map(|s| s[1]).into(),
+            point.reported.into(),
+            point.rays.into(),
+            point.iterations.into(),
+            u64::from(point.pareto).into(),
+            self.measure.label().into(),
+            (self.machine.threads as u64).into(),
+            self.machine.cpu.as_str().into(),
+        ]
+    }
+
+    /// A table of the first and last point of each solve, then the conclusions.
+    pub fn words(&self) -> String {
+        let names = self.curves.iter().map(|curve| curve.name.chars().count());
+        let width = names.max().unwrap_or(0).max(5);
+        let mut text = format!("{}, {}\n", self.capture, self.machine.words());
+        text += &format!(
+            "{:width$}  {:>8}  {:>10}  {:>8}  {:>10}  {:>21}  {:>9}  {:>8}  front\n",
+            "solve", "first s", "error", "end s", "error", "one deviation", "claimed", "M rays"
+        );
+        for curve in &self.curves {
+            text += &line(curve, width);
+        }
+        for finding in &self.findings {
+            text += &format!("{finding}\n");
+        }
+        text
+    }
+}
+
+fn line(curve: &Curve, width: usize) -> String {
+    let Some((first, last)) = curve.points.first().zip(curve.points.last()) else {
+        return format!("{:width$}  no estimate in its time\n", curve.name);
+    };
+    let spread = last.spread.map_or(String::new(), |[low, high]| {
+        format!("{low:.5} to {high:.5}")
+    });
+    let claimed = last
+        .reported
+        .map_or("-".to_owned(), |claim| format!("{:.2} %", claim * 100.0));
+    format!(
+        "{:width$}  {:>8.2}  {:>10.5}  {:>8.2}  {:>10.5}  {spread:>21}  {claimed:>9}  {:>8.1}  {}\n",
+        curve.name,
+        first.seconds,
+        first.error,
+        last.seconds,
+        last.error,
+        last.rays as f64 * 1e-6,
+        if last.pareto { "yes" } else { "" }
+    )
 }

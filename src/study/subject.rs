@@ -3,11 +3,13 @@
 use crate::calibrate::problem::Problem;
 use crate::capture::Capture;
 use crate::capture::photograph::Photograph;
+use crate::capture::truth::Truth;
 use crate::error::Result;
 use crate::room::Room;
 use crate::room::photographs::{self, Rendering};
+use crate::scene::Scene;
 use crate::study::evaluate::Reference;
-use crate::study::trade::{Metric, rooms};
+use crate::study::trade::Metric;
 use std::sync::Arc;
 
 /// A named problem with its truth.
@@ -37,11 +39,20 @@ impl Subject {
     /// # Errors
     /// The room's mesh is empty, or there is no photograph.
     pub fn of_photographs(room: &Room, photographs: Vec<Photograph>) -> Result<Self> {
-        let (capture, problem, reference) = rooms::with_photographs(room, photographs)?;
+        let size = photographs.first().map_or([0; 2], |p| [p.width, p.height]);
+        let capture = room.capture_of(photographs, size);
+        let frames = capture.frames.iter();
+        let photographs: Vec<_> = frames.map(|frame| frame.load()).collect::<Result<_>>()?;
+        let scene = Scene::new(&capture)?;
+        let truth: Truth = room.truth(size)?;
+        let reference = Reference::new(truth, &capture, &scene, &photographs);
         Ok(Self {
             name: room.name.clone(),
             capture: Arc::new(capture),
-            problem,
+            problem: Problem {
+                scene: Arc::new(scene),
+                photographs,
+            },
             metric: Metric::Truth(Box::new(reference)),
         })
     }
