@@ -42,7 +42,7 @@ pub struct ViewState {
     pub layout: LayoutRequest,
 }
 
-/// What panes of pictures borrow.
+/// What a pane borrows.
 pub struct Parts<'a> {
     /// What is shown.
     pub document: &'a Document,

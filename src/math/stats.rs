@@ -23,6 +23,16 @@ impl FromIterator<f64> for Moments {
     }
 }
 
+/// Values beyond this multiple of the 68th percentile of the magnitudes are clamped to it.
+const CLIP: f64 = 5.0;
+
+/// The values with outliers clamped, so that a few do not decide about their mean.
+pub fn without_outliers(values: &[f64]) -> Vec<f64> {
+    let mut sizes: Vec<f64> = values.iter().map(|v| v.abs()).collect();
+    let clip = CLIP * quantile(&mut sizes, 0.68).unwrap_or(0.0);
+    values.iter().map(|v| v.clamp(-clip, clip)).collect()
+}
+
 impl Moments {
     /// Adds one sample.
     pub fn push(&mut self, x: f64) {
@@ -114,6 +124,15 @@ pub(super) fn chi_square(cells: &[u32]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn outliers_are_clamped_to_five_times_the_68th_percentile() {
+        let mut values: Vec<f64> = (0..100).map(|i| f64::from(i % 2) - 0.5).collect();
+        values.extend([90.0, -70.0]);
+        let kept = without_outliers(&values);
+        assert_eq!(kept[..100], values[..100]);
+        assert_eq!(kept[100..], [2.5, -2.5]);
+    }
 
     #[test]
     fn merged_moments_equal_those_of_all_samples() {

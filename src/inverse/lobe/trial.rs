@@ -4,7 +4,7 @@ use crate::inverse::lobe::LobeFit;
 use crate::inverse::lobe::fit::{Model, Row, Variances, decorrelated};
 use crate::inverse::lobe::gather::{Components, Gathered, Gathering};
 use crate::inverse::lobe::observations::{Spot, SpotObservation, choose};
-use crate::math::stats::{Moments, medians, quantile};
+use crate::math::stats::{Moments, medians, without_outliers};
 use crate::scene::Scene;
 use crate::transport::arrival::RayCount;
 use glam::DVec3;
@@ -22,8 +22,6 @@ const HALVINGS: u32 = 5;
 const FOLDS: usize = 4;
 /// Fraction of the median level below which weights stop growing.
 const DARK: f64 = 0.5;
-/// The gain of a spot is clamped to this multiple of the 68th percentile.
-const CLIP: f64 = 5.0;
 /// Relative step of finite differences in roughness.
 const STEP: f64 = 0.02;
 
@@ -240,10 +238,7 @@ fn best(
 
 /// Mean and standard error of spots' gains, with clamped outliers.
 fn gain(gains: Vec<f64>) -> Gain {
-    let mut sizes: Vec<f64> = gains.iter().map(|g| g.abs()).collect();
-    let clip = CLIP * quantile(&mut sizes, 0.68).unwrap_or(0.0);
-    let mut moments = Moments::default();
-    (gains.iter()).for_each(|g| moments.push(g.clamp(-clip, clip)));
+    let moments: Moments = without_outliers(&gains).into_iter().collect();
     Gain {
         mean: moments.mean,
         noise: moments.standard_error(),

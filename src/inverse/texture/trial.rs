@@ -6,7 +6,7 @@ use crate::inverse::texture::gloss::{gloss, white_base};
 use crate::inverse::texture::look::SeenPixel;
 use crate::math::color::luminance;
 use crate::math::rng::Stream;
-use crate::math::stats::{Moments, quantile};
+use crate::math::stats::{Moments, quantile, without_outliers};
 use crate::transport::arrival::RayCount;
 use crate::transport::lit::LitScene;
 use crate::transport::path::PathOptions;
@@ -31,8 +31,6 @@ const BLOCKS: u32 = 4;
 /// Least number of photographs, and of blocks, for a standard error over blocks.
 const MIN_PHOTOGRAPHS: usize = 2;
 const MIN_BLOCKS: f64 = 8.0;
-/// The gain of a pixel is clamped to this multiple of the 68th percentile.
-const CLIP: f64 = 5.0;
 
 /// The outcome. Errors are squared, relative to the squared level, and averaged over pixels; they include photograph noise.
 #[derive(Debug, Clone, Copy, Default)]
@@ -231,11 +229,10 @@ impl Trial {
         let errors: Vec<[f64; 2]> = (pixels.iter())
             .map(|p| [p.with(constant), p.textured].map(|prediction| p.error(prediction)))
             .collect();
-        let mut sizes: Vec<f64> = errors.iter().map(|[a, b]| (a - b).abs()).collect();
-        let clip = CLIP * quantile(&mut sizes, 0.68).unwrap_or(0.0);
         let gains: Vec<f64> = (errors.iter())
-            .map(|[flat, textured]| (flat - textured).clamp(-clip, clip))
+            .map(|[flat, textured]| flat - textured)
             .collect();
+        let gains = without_outliers(&gains);
         let mut moments = [Moments::default(); 3];
         for ([flat, textured], &gain) in errors.iter().zip(&gains) {
             moments[0].push(*flat);
