@@ -65,7 +65,7 @@ pub struct FitPoint {
 }
 
 /// A finished stage of the pipeline.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Stage {
     /// Its name, e.g. "objects".
     pub name: String,

@@ -2,7 +2,7 @@
 
 use crate::app::panels::plot::{at, decades, hovered, legend};
 use crate::app::theme;
-use crate::inverse::solver::{LossPoint, Progress};
+use crate::inverse::solver::{LossPoint, Progress, Stage};
 use egui::Ui;
 use egui_plot::{Line, LineStyle, Plot, PlotPoints, Points, VLine};
 
@@ -26,7 +26,12 @@ pub fn pane(ui: &mut Ui, progress: &Progress) {
         .x_axis_formatter(|mark, _| format!("{} s", mark.value))
         .label_formatter(|position| {
             hovered(position, |name, p| {
-                format!("{name}\n{:.1} s: {}", p.x, at(p.y))
+                let value = format!("{name}\n{:.1} s: {}", p.x, at(p.y));
+                match stage_at(&progress.stages, p.x) {
+                    Some(stage) if name.is_empty() => format!("{stage} ends at {:.1} s", p.x),
+                    Some(stage) => format!("{value}\n{stage}"),
+                    None => value,
+                }
             })
         })
         .y_grid_spacer(decades)
@@ -35,7 +40,8 @@ pub fn pane(ui: &mut Ui, progress: &Progress) {
             let mut end = 0.0;
             for stage in &progress.stages {
                 end += stage.seconds;
-                let line = VLine::new(&stage.name, end).color(tokens.outline);
+                // Without a name it stays out of the legend.
+                let line = VLine::new("", end).color(tokens.outline);
                 plot.vline(line.style(LineStyle::dashed_loose()));
             }
             // A single point has no line.
@@ -52,6 +58,16 @@ pub fn pane(ui: &mut Ui, progress: &Progress) {
                 }
             }
         });
+}
+
+/// The stage at a time since the start; `None` after the last that has ended.
+fn stage_at(stages: &[Stage], seconds: f64) -> Option<&str> {
+    let mut end = 0.0;
+    let stage = stages.iter().find(|stage| {
+        end += stage.seconds;
+        seconds <= end
+    })?;
+    Some(&stage.name)
 }
 
 /// Seconds and logarithm of a loss.
@@ -77,6 +93,19 @@ fn logarithmic(points: impl Iterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_time_is_in_the_first_stage_that_ends_no_earlier() {
+        let stages = [("light field", 2.0), ("refine", 3.0)].map(|(name, seconds)| Stage {
+            name: name.to_owned(),
+            seconds,
+            ..Stage::default()
+        });
+        let at = |seconds| stage_at(&stages, seconds);
+        assert_eq!(at(2.0), Some("light field"));
+        assert_eq!(at(4.9), Some("refine"));
+        assert_eq!(at(5.1), None);
+    }
 
     #[test]
     fn curves_are_logarithmic_keep_their_end_and_leave_out_what_was_not_measured() {

@@ -35,7 +35,7 @@ pub fn at(logarithm: f64) -> String {
 /// A legend in the corner that falling curves leave free.
 pub fn legend() -> Legend {
     let legend = Legend::default().position(Corner::LeftBottom);
-    legend.background_alpha(0.6)
+    legend.background_alpha(0.6).follow_insertion_order(true)
 }
 
 /// The label of the curve's point under the pointer, made from the curve's name and the place.
