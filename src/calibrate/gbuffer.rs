@@ -147,8 +147,8 @@ struct FrameView<'a> {
 }
 
 impl FrameView<'_> {
-    /// Samples a pixel with stratified offsets from `stream`; returns it with its width on the surface and the number of rays. Where
-    /// the pixel and its neighbours see one plane, the points are computed on that plane without casting rays.
+    /// Samples a pixel with stratified offsets from `stream`; returns it with its width on the surface and the number of rays.
+    /// Where the pixel and its neighbours see one plane, the points are computed on that plane without casting rays.
     fn sample(&self, pixel: usize, mut stream: Stream) -> (GBufferPixel, Option<f32>, u64) {
         let width = self.camera.intrinsics.width as usize;
         let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);

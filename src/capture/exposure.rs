@@ -51,8 +51,8 @@ impl Default for Exposure {
 }
 
 impl Exposure {
-    /// The factor from radiance to light on the sensor at a pixel's centre. `pixel` counts row by row from the top left of a picture
-    /// of the given size, which may differ from the lens's.
+    /// The factor from radiance to light on the sensor at a pixel's centre. `pixel` counts row by row from the top left of a
+    /// picture of the given size, which may differ from the lens's.
     pub fn at(&self, lens: &Intrinsics, [width, height]: [u32; 2], pixel: usize) -> Vec3 {
         let Some(vignetting) = &self.vignetting else {
             return self.factor;

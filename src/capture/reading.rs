@@ -177,8 +177,8 @@ fn number(factor: f64) -> String {
 }
 
 impl Intrinsics {
-    /// The lens under a reading. A quarter turn of the photographs swaps width and height. A principal point at the picture's middle
-    /// stays at the middle; any other is taken as given for the turned picture.
+    /// The lens under a reading. A quarter turn of the photographs swaps width and height. A principal point at the picture's
+    /// middle stays at the middle; any other is taken as given for the turned picture.
     pub fn read_as(&self, reading: &Reading) -> Self {
         let mut lens = *self;
         lens.fx *= reading.focal * reading.lens_scale;

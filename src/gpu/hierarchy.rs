@@ -6,8 +6,8 @@ use glam::Vec3;
 /// Nodes and the order of the triangles in their leaves.
 #[derive(Debug, Default)]
 pub(super) struct Hierarchy {
-    /// Two entries per node: low corner and first child or triangle; high corner and number of triangles (0 in inner nodes). The second
-    /// child follows the first.
+    /// Two entries per node: low corner and first child or triangle; high corner and number of triangles (0 in inner nodes). The
+    /// second child follows the first.
     pub nodes: Vec<[u32; 4]>,
     /// Triangle indices in the order of the leaves.
     pub order: Vec<u32>,

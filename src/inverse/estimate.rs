@@ -193,7 +193,8 @@ pub fn relative_to_albedo(error: Vec3, albedo: Vec3) -> f64 {
 
 impl Estimate {
     /// The reported error: the median relative standard error of albedo, over objects whose albedo is determined and that at least
-    /// [`ENOUGH_PIXELS`] pixels see; `None` if there are none. It is without [`Self::common_error`], which no number of paths lowers.
+    /// [`ENOUGH_PIXELS`] pixels see; `None` if there are none. It is without [`Self::common_error`], which no number of paths
+    /// lowers.
     pub fn relative_error(&self) -> Option<f64> {
         let common = f64::from(self.common_error);
         let mut relative: Vec<f64> = (self.objects.iter())

@@ -50,8 +50,8 @@ pub struct LateLight {
 }
 
 impl LossProbe {
-    /// Chooses up to `pixels` usable pixels that see the mesh for each set, spread evenly over all photographs. Each is rendered with
-    /// `samples` paths of at most `max_bounces` bounces.
+    /// Chooses up to `pixels` usable pixels that see the mesh for each set, spread evenly over all photographs. Each is rendered
+    /// with `samples` paths of at most `max_bounces` bounces.
     pub fn new(
         problem: &Problem,
         settings: &Settings,

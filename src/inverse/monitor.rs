@@ -70,8 +70,8 @@ impl<'a> Monitor<'a> {
         Ok(())
     }
 
-    /// Reports to the observer, and applies its answer and the limits of time and error. `checkpoint` is called only if the observer
-    /// keeps one.
+    /// Reports to the observer, and applies its answer and the limits of time and error. `checkpoint` is called only if the
+    /// observer keeps one.
     ///
     /// # Errors
     /// The reason to end the solve.

@@ -107,8 +107,8 @@ impl MeasuredOutside {
         half.censored[cell]
     }
 
-    /// Whether a sun may shine in along a ray. From far away it may. Through a box it may where photographs show light from above the
-    /// horizon that is brighter than the room: elsewhere the scan lacks a wall, or nobody looked.
+    /// Whether a sun may shine in along a ray. From far away it may. Through a box it may where photographs show light from above
+    /// the horizon that is brighter than the room: elsewhere the scan lacks a wall, or nobody looked.
     #[inline]
     pub fn is_open(&self, origin: Vec3, direction: Vec3) -> bool {
         let (half, cell) = self.cell(origin, direction);
@@ -147,8 +147,8 @@ impl MeasuredOutside {
         &self.map
     }
 
-    /// Expected radiance of an unmeasured direction: the mean over measured directions within ± `band` / 2 radians of its elevation,
-    /// or over all measured directions.
+    /// Expected radiance of an unmeasured direction: the mean over measured directions within ± `band` / 2 radians of its
+    /// elevation, or over all measured directions.
     pub fn expected(&self, direction: Vec3, band: f64) -> Vec3 {
         let elevation_of = |d: Vec3| f64::from(d.dot(self.up).clamp(-1.0, 1.0)).asin();
         let elevation = elevation_of(direction);
@@ -179,8 +179,8 @@ impl MeasuredOutside {
         self.map.size()
     }
 
-    /// The completed map of light that comes from `towards`, or of each cell's own direction: measured radiance, plus `excess` where it
-    /// is a lower bound, and `elsewhere` in unmeasured directions.
+    /// The completed map of light that comes from `towards`, or of each cell's own direction: measured radiance, plus `excess`
+    /// where it is a lower bound, and `elsewhere` in unmeasured directions.
     pub fn filled(
         &self,
         towards: Option<Vec3>,
@@ -210,7 +210,8 @@ impl Half {
         self.known[cell] && (self.censored[cell] || luminance(pixels[cell]) > least)
     }
 
-    /// The cells, and their mean radiances. Gaps are filled from coarser blocks. Saturated pixels count only in blocks without unsaturated ones.
+    /// The cells, and their mean radiances. Gaps are filled from coarser blocks. Saturated pixels count only in blocks without
+    /// unsaturated ones.
     fn new(width: usize, height: usize, sums: &[Sums]) -> (Self, Vec<Vec3>) {
         // Whether the mean of the block of 2^level cells a side around a cell is a lower bound, and the mean.
         let block_mean = |cell: usize, level: usize| {

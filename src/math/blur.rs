@@ -17,8 +17,8 @@ pub trait Blend:
 impl Blend for f32 {}
 impl Blend for Vec3 {}
 
-/// Gaussian blur of a picture of `shape` (width, height) with a standard deviation in pixels along rows, or along columns if `down`;
-/// the border pixel is repeated.
+/// Gaussian blur of a picture of `shape` (width, height) with a standard deviation in pixels along rows, or along columns if
+/// `down`; the border pixel is repeated.
 pub fn blurred<T: Blend>(values: &[T], shape: [usize; 2], deviation: f32, down: bool) -> Vec<T> {
     if deviation <= 0.0 || values.is_empty() {
         return values.to_vec();

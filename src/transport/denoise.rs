@@ -17,7 +17,8 @@ use rayon::prelude::*;
 const PASSES: u32 = 5;
 /// Cubic B-spline weights.
 const SPLINE: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
-/// Luminance differences between averages of 3 × 3 pixels are measured in units of this many standard deviations of a pixel's noise.
+/// Luminance differences between averages of 3 × 3 pixels are measured in units of this many standard deviations of a pixel's
+/// noise.
 const LUMINANCE_SIGMAS: f32 = 0.7;
 /// Power of the cosine between normals in the weights.
 const NORMAL_POWER: i32 = 64;
@@ -25,8 +26,8 @@ const NORMAL_POWER: i32 = 64;
 const PLANE_DISTANCE: f32 = 0.01;
 /// Radius in pixels over which the noise variance is averaged first.
 const NOISE_RADIUS: isize = 3;
-/// Radius in pixels over which normals are averaged first, and the power of the cosine between them in the weights: a scanned wall's
-/// triangles differ by ten degrees and more, and the weights of the filter would find nothing like a pixel.
+/// Radius in pixels over which normals are averaged first, and the power of the cosine between them in the weights: a scanned
+/// wall's triangles differ by ten degrees and more, and the weights of the filter would find nothing like a pixel.
 const NORMAL_RADIUS: isize = 3;
 const STEADY_POWER: i32 = 16;
 
@@ -172,8 +173,8 @@ pub fn denoise(a: &Picture, b: &Picture, guides: &[Option<Guide>]) -> Picture {
     }
 }
 
-/// Luminance of both pictures averaged over 3 × 3 pixels of the same object. Weights from single pixels would keep a rare sample that both
-/// pictures happen to have at one pixel.
+/// Luminance of both pictures averaged over 3 × 3 pixels of the same object. Weights from single pixels would keep a rare sample
+/// that both pictures happen to have at one pixel.
 fn levels(light: &[[Vec3; 2]], guides: &[Option<Guide>], around: Around) -> Vec<[f32; 2]> {
     let level = |pixel: usize| {
         let (mut sums, mut weights) = ([0.0; 2], 0.0);
@@ -190,8 +191,8 @@ fn levels(light: &[[Vec3; 2]], guides: &[Option<Guide>], around: Around) -> Vec<
     (0..light.len()).into_par_iter().map(level).collect()
 }
 
-/// How far the luminance of a pixel lies outside of the range of its neighbours on the same object; 0 if less than that range, or without
-/// neighbours.
+/// How far the luminance of a pixel lies outside of the range of its neighbours on the same object; 0 if less than that range, or
+/// without neighbours.
 fn beyond_neighbours(
     light: &[[Vec3; 2]],
     guides: &[Option<Guide>],

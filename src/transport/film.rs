@@ -55,8 +55,8 @@ impl Film {
         self.add_rows(world, camera, options, (seed, frame), rows, samples);
     }
 
-    /// Adds `samples` paths to each pixel of some rows, keyed as in [`Film::add`]. The call with the last row increases the number of
-    /// samples; until then [`Film::mean`] is invalid.
+    /// Adds `samples` paths to each pixel of some rows, keyed as in [`Film::add`]. The call with the last row increases the number
+    /// of samples; until then [`Film::mean`] is invalid.
     pub fn add_rows(
         &mut self,
         world: &impl World,

@@ -38,8 +38,8 @@ pub struct Split {
 pub type Parts = Vec<(Origin, Vec3)>;
 
 impl Split {
-    /// One layer for each of the at most [`MAX_LAMPS`] lamps with the largest area × luminance, in the scene's order, one for all other
-    /// lamps, and one for the environment; empty layers are left out.
+    /// One layer for each of the at most [`MAX_LAMPS`] lamps with the largest area × luminance, in the scene's order, one for all
+    /// other lamps, and one for the environment; empty layers are left out.
     pub fn new(lit: &LitScene) -> Self {
         let emission = |object: usize| lit.materials.get(object).map_or(Vec3::ZERO, |m| m.emission);
         Self::of(&lit.scene, emission, lit.outside.is_some())
@@ -89,8 +89,8 @@ impl Split {
         self.sources.get(layer as usize).copied()
     }
 
-    /// Adds the light of one path to the layers' sums of its pixel. Consumes the stream as [`crate::transport::path::radiance`] does,
-    /// so the layers sum to that path's radiance.
+    /// Adds the light of one path to the layers' sums of its pixel. Consumes the stream as [`crate::transport::path::radiance`]
+    /// does, so the layers sum to that path's radiance.
     pub fn add(
         &self,
         world: &LitScene,
@@ -112,8 +112,8 @@ impl Split {
         }
     }
 
-    /// One picture per layer from `samples` paths per pixel, keyed as in [`crate::transport::film::Film::add`]: the layers sum to that
-    /// film's picture.
+    /// One picture per layer from `samples` paths per pixel, keyed as in [`crate::transport::film::Film::add`]: the layers sum to
+    /// that film's picture.
     pub fn render(
         &self,
         world: &LitScene,

@@ -99,8 +99,8 @@ pub fn radiance_by_origin(
     sample
 }
 
-/// Radiance of a white diffuse surface at a point on the side of `normal` (irradiance / π), estimated by one path. The actual albedo
-/// and emission there are ignored.
+/// Radiance of a white diffuse surface at a point on the side of `normal` (irradiance / π), estimated by one path. The actual
+/// albedo and emission there are ignored.
 pub fn white_radiance(
     world: &impl World,
     surface: &SurfacePoint,

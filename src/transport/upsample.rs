@@ -9,10 +9,11 @@ use rayon::prelude::*;
 /// Weight of a pixel of the small render that sees another surface, so that a thin surface that it missed gets some light.
 const OTHER_SURFACE: f32 = 1e-4;
 
-/// The picture of a view from a smaller render of it. `seen` and `seen_small` are the features of both pictures' pixels, row by row.
+/// The picture of a view from a smaller render of it. `seen` and `seen_small` are the features of both pictures' pixels, row by
+/// row.
 ///
-/// Light, which is radiance over albedo, is averaged over the nearest 3 × 3 pixels of the small render by a quadratic B-spline and by
-/// how alike the surfaces are. Emitters get their own radiance, and the background that of the small render.
+/// Light, which is radiance over albedo, is averaged over the nearest 3 × 3 pixels of the small render by a quadratic B-spline and
+/// by how alike the surfaces are. Emitters get their own radiance, and the background that of the small render.
 pub fn upsample(
     small: &Picture,
     seen_small: &[Option<Guide>],

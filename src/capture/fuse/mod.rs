@@ -22,9 +22,9 @@ use view::View;
 /// Default limit on the memory of all voxels.
 pub const MAX_BYTES: usize = 2 << 30;
 
-/// Fuses all depth images, in frame order, into a mesh with voxels of `edge` metres that take at most `max_bytes` of memory: one object of
-/// triangles whose front faces the cameras, with linear vertex colours.
-/// `progress` gets the number of fused depth images and of all.
+/// Fuses all depth images, in frame order, into a mesh with voxels of `edge` metres that take at most `max_bytes` of memory: one
+/// object of triangles whose front faces the cameras, with linear vertex colours. `progress` gets the number of fused depth images
+/// and of all.
 ///
 /// # Errors
 /// A depth image or photograph is broken, the voxels need more memory, or no surface comes out.

@@ -1,10 +1,10 @@
 //! Reads a house of Matterport3D (Chang et al. 2017).
 //!
 //! Photographs are the HDR images in `matterport_hdr_images` if converted to EXR or HDR, else the tone-mapped ones in
-//! `matterport_color_images`. Lenses are in `matterport_camera_intrinsics` (one line: width height fx fy cx cy k1 k2 p1 p2 k3), poses
-//! in `matterport_camera_poses` (camera to world, OpenCV's axes); files are named `UUID_KINDcamera_yaw`. Without these, cameras come
-//! from `undistorted_camera_parameters/*.conf` with `undistorted_color_images`, whose cy counts from the bottom. Depth is in quarter
-//! millimetres. The mesh in `house_segmentations`, which has objects, is preferred.
+//! `matterport_color_images`. Lenses are in `matterport_camera_intrinsics` (one line: width height fx fy cx cy k1 k2 p1 p2 k3),
+//! poses in `matterport_camera_poses` (camera to world, OpenCV's axes); files are named `UUID_KINDcamera_yaw`. Without these,
+//! cameras come from `undistorted_camera_parameters/*.conf` with `undistorted_color_images`, whose cy counts from the bottom. Depth
+//! is in quarter millimetres. The mesh in `house_segmentations`, which has objects, is preferred.
 
 use crate::capture::import::folder::Folder;
 use crate::capture::import::geometry;

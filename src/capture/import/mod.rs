@@ -1,9 +1,9 @@
 //! Imports scans of other programs: posed photographs with their lenses, and a mesh.
 //!
-//! Each format's reader has `is_here`, whether a folder has its layout, and `read`, which returns a `Scan`: every frame with a known
-//! pose, and the mesh if the scan has one. It fails if a file is missing, broken or outside the folder. This module does what all
-//! formats share: it selects frames and reads the mesh or fuses one from the depth images ([`crate::capture::fuse`]). Nothing outside
-//! the scan's folder is opened except a mesh that the person names.
+//! Each format's reader has `is_here`, whether a folder has its layout, and `read`, which returns a `Scan`: every frame with a
+//! known pose, and the mesh if the scan has one. It fails if a file is missing, broken or outside the folder. This module does what
+//! all formats share: it selects frames and reads the mesh or fuses one from the depth images ([`crate::capture::fuse`]). Nothing
+//! outside the scan's folder is opened except a mesh that the person names.
 
 mod colmap;
 mod folder;

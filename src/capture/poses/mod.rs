@@ -32,8 +32,8 @@ const MIN_HELD_OUT: usize = 4;
 /// More photographs are not refined: the equations of all poses are dense.
 const MAX_PHOTOGRAPHS: usize = 400;
 
-/// Refines the poses of the photographs `chosen` (indices, those without depth are left out). Returns a remark on it. Returns `None`,
-/// and changes nothing, where held-out points do not gain, and with more than [`MAX_PHOTOGRAPHS`].
+/// Refines the poses of the photographs `chosen` (indices, those without depth are left out). Returns a remark on it. Returns
+/// `None`, and changes nothing, where held-out points do not gain, and with more than [`MAX_PHOTOGRAPHS`].
 ///
 /// # Errors
 /// A photograph or depth image is broken.

@@ -11,8 +11,8 @@ pub const ALBEDO_DEVIATION: f32 = 0.5;
 pub const UNSEEN_DEVIATION: f32 = 0.25;
 /// Mean of an unknown albedo.
 pub const ALBEDO_MEAN: f32 = 0.5;
-/// Standard deviation of outside radiance in a direction before a fit, in mean radiances of the photographs: what shines through the
-/// windows of a modelled room.
+/// Standard deviation of outside radiance in a direction before a fit, in mean radiances of the photographs: what shines through
+/// the windows of a modelled room.
 const OUTSIDE_DEVIATION: f32 = 4.0;
 /// The same for a scan. Its holes lead to the rest of the room, which is about as bright as what the photographs show.
 const SCAN_DEVIATION: f32 = 1.0;
@@ -109,8 +109,8 @@ impl Prior {
         self
     }
 
-    /// The prior with the given means of the outside directions, by surface. A direction may be off by as much as its mean, and in a
-    /// modelled room by as much as the brightest of them: one sky shines through all windows.
+    /// The prior with the given means of the outside directions, by surface. A direction may be off by as much as its mean, and in
+    /// a modelled room by as much as the brightest of them: one sky shines through all windows.
     pub fn with_sky(mut self, expected: impl Fn(u32) -> Vec3) -> Self {
         let mut brightest = Vec3::ZERO;
         for (surface, (mean, deviation)) in (self.outside as u32..).zip(&mut self.directions) {

@@ -170,8 +170,9 @@ impl Rows {
         x
     }
 
-    /// Minimises ½ dᵀ(H + D) d − gᵀ d with x + d between zero and `upper` by block principal pivoting (Júdice and Pires 1994), which
-    /// changes many parameters at a time between free and held at a bound. D is `added`, and g is `descent`, minus the gradient at x.
+    /// Minimises ½ dᵀ(H + D) d − gᵀ d with x + d between zero and `upper` by block principal pivoting (Júdice and Pires 1994),
+    /// which changes many parameters at a time between free and held at a bound. D is `added`, and g is `descent`, minus the
+    /// gradient at x.
     pub fn bounded_step(
         &self,
         x: &[DVec3],

@@ -6,9 +6,9 @@ use crate::transport::environment::{direction_of, pixel_of};
 use crate::transport::surroundings::Surroundings;
 use glam::Vec3;
 
-/// Outside directions as the pixels of a map; each is a surface with an emission. Three more surfaces stand for the sun, and for the
-/// excess over the lower bound in directions in which all photographs are saturated: above the horizon and below it, since a window
-/// shows the sky from below and the ground from above.
+/// Outside directions as the pixels of a map; each is a surface with an emission. Three more surfaces stand for the sun, and for
+/// the excess over the lower bound in directions in which all photographs are saturated: above the horizon and below it, since a
+/// window shows the sky from below and the ground from above.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OutsideGrid {
     /// Index of the first pixel's surface.

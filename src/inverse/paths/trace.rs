@@ -368,7 +368,8 @@ impl Tracer<'_> {
         self.fraction(self.outside.is_some_and(|grid| grid.sun.is_some()))
     }
 
-    /// Light samples are divided evenly among emitters of the mesh, the measured outside light and the sun, as far as there are any.
+    /// Light samples are divided evenly among emitters of the mesh, the measured outside light and the sun, as far as there are
+    /// any.
     fn fraction(&self, exists: bool) -> f32 {
         let sun = self.outside.is_some_and(|grid| grid.sun.is_some());
         let all = [!self.lights.is_dark(), self.sky.is_some(), sun];

@@ -51,7 +51,8 @@ impl Pipeline<'_, '_> {
     }
 }
 
-/// The role, according to the photographs and under known values: a known emission decides whether the object emits, and with a known albedo it reflects.
+/// The role, according to the photographs and under known values: a known emission decides whether the object emits, and with a
+/// known albedo it reflects.
 pub(super) fn role_under(pinned: Pinned, role: Role) -> Role {
     let emits = pinned.emission.map(|emission| emission != Vec3::ZERO);
     match (emits, role) {

@@ -19,8 +19,8 @@ const LIGHT_FIELD_BIAS: f32 = 0.01;
 const MIN_DEVIATION: f32 = 1e-3;
 
 impl Pipeline<'_, '_> {
-    /// First stage: paths end at measured radiance, so that each object's albedo is nearly an independent linear fit of its radiance
-    /// to its irradiance.
+    /// First stage: paths end at measured radiance, so that each object's albedo is nearly an independent linear fit of its
+    /// radiance to its irradiance.
     pub(super) fn light_field(&mut self) -> Result<(), Termination> {
         let started = self.monitor.seconds();
         self.monitor.phase("gathering light from the photographs");
@@ -85,7 +85,8 @@ impl Pipeline<'_, '_> {
     ) -> Result<(), Termination> {
         self.unknowns = Unknowns::new(self.roles.len());
         self.robust = RobustWeights::even(self.roles.len());
-        // Seen lamps first: while they are fitted as white walls, unseen objects and the outside would be given light to explain them.
+        // Seen lamps first: while they are fitted as white walls, unseen objects and the outside would be given light to explain
+        // them.
         for out_of_sight in [Role::Dark, Role::Unseen] {
             for (k, role) in self.roles.iter_mut().enumerate() {
                 match self.gbuffer.seen.get(k) {

@@ -26,7 +26,8 @@ const ESCAPING: f64 = 1e-3;
 const OUTSIDE_GAIN: f64 = 0.03;
 /// Standard errors by which the squared error falls.
 const FALL_ERRORS: f64 = 4.0;
-/// Standard errors by which a sun's light exceeds zero: the usual bound for one unknown, since the squared error decides about its direction.
+/// Standard errors by which a sun's light exceeds zero: the usual bound for one unknown, since the squared error decides about its
+/// direction.
 const SUN_ERRORS: f32 = 3.0;
 
 /// Stored paths that end in measured radiance, and what more of them are traced with.
@@ -72,9 +73,9 @@ impl Pipeline<'_, '_> {
         }
     }
 
-    /// Tries light from outside the mesh, where paths leave it. A scan gets it without a test: what was not scanned reflects light, if
-    /// nothing else, and the light field without it makes walls lighter, or gives them light of their own, until nothing is left to
-    /// improve.
+    /// Tries light from outside the mesh, where paths leave it. A scan gets it without a test: what was not scanned reflects light,
+    /// if nothing else, and the light field without it makes walls lighter, or gives them light of their own, until nothing is left
+    /// to improve.
     pub(super) fn light_from_outside(&mut self, field: LightField) -> Result<(), Termination> {
         let escaping = field.cache.fraction_ending_on(self.outside.first);
         if escaping <= ESCAPING || !self.monitor.settings.outside_light {
@@ -94,8 +95,8 @@ impl Pipeline<'_, '_> {
         self.record("outside light", started, self.open, why)
     }
 
-    /// Tries light from infinity, without a sun and with one if there is a candidate. Keeps it if the light field's squared error falls
-    /// clearly. A mesh that is not a scan is assumed to lack windows only. Returns in words what the light does.
+    /// Tries light from infinity, without a sun and with one if there is a candidate. Keeps it if the light field's squared error
+    /// falls clearly. A mesh that is not a scan is assumed to lack windows only. Returns in words what the light does.
     fn light_through_windows(&mut self, field: LightField) -> Result<String, Termination> {
         // A linear step estimates the gain at a small fraction of the cost of a trial.
         let gain = self.outside_gain(field.cache);
@@ -141,8 +142,8 @@ impl Pipeline<'_, '_> {
         Ok(format!("comes from {from}{}", self.sun_in_words()))
     }
 
-    /// Searches for a sun after a fit of outside light without one, and fits with the best candidate. Returns the fit with the sun if
-    /// it lowers the squared error by `needed` and the sun shines, else that without.
+    /// Searches for a sun after a fit of outside light without one, and fits with the best candidate. Returns the fit with the sun
+    /// if it lowers the squared error by `needed` and the sun shines, else that without.
     fn with_sun(
         &mut self,
         without: Found,
@@ -312,8 +313,9 @@ impl Pipeline<'_, '_> {
     }
 }
 
-/// The squared relative error of the model for each cluster of the fit, at most one, and the cluster's pixels. It is measured across the
-/// two sets of paths, so that their noise adds nothing: sunlight that arrives after a bounce is much noisier than a lamp that is seen.
+/// The squared relative error of the model for each cluster of the fit, at most one, and the cluster's pixels. It is measured
+/// across the two sets of paths, so that their noise adds nothing: sunlight that arrives after a bounce is much noisier than a lamp
+/// that is seen.
 struct Misfit(Vec<(f64, f64)>);
 
 impl Misfit {

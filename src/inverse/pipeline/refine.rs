@@ -35,8 +35,8 @@ const PREDICTING: u64 = 4;
 const MIN_PREDICTING: u64 = 256;
 /// Paths of a round over the paths that light the patches of lamps.
 const LIGHTING_LAMPS: u64 = 32;
-/// Median error of albedo at which the light suffices for textures, since a single pixel determines a texel to some per cent. Small objects that
-/// are less accurate are not waited for.
+/// Median error of albedo at which the light suffices for textures, since a single pixel determines a texel to some per cent. Small
+/// objects that are less accurate are not waited for.
 const ENOUGH_FOR_TEXTURES: f64 = 5e-3;
 
 /// The linearised clusters over all rounds.
@@ -100,7 +100,8 @@ impl Pipeline<'_, '_> {
         Ok(ended)
     }
 
-    /// Warns if held-out pixels became clearly worse: the fit then explains the pixels in it by light or colours that are not there.
+    /// Warns if held-out pixels became clearly worse: the fit then explains the pixels in it by light or colours that are not
+    /// there.
     fn doubt_refinement(&mut self, before: &[f64]) {
         let after = self.held_out_each();
         let increase = increase(before, &after);
@@ -269,8 +270,8 @@ impl Pipeline<'_, '_> {
         self.monitor.cast(cast);
     }
 
-    /// Weights the clusters by levels predicted from a few paths, which are independent of those of the rounds. Each albedo is raised
-    /// by its standard error: objects wrongly estimated as black would otherwise get too much weight.
+    /// Weights the clusters by levels predicted from a few paths, which are independent of those of the rounds. Each albedo is
+    /// raised by its standard error: objects wrongly estimated as black would otherwise get too much weight.
     fn weigh_by_prediction(&mut self, lights: &Emitters) -> Result<(), Termination> {
         self.distribute(self.budget.round_paths / PREDICTING);
         let least =

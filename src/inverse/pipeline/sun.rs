@@ -187,8 +187,8 @@ fn directions(columns: usize) -> impl Iterator<Item = Vec3> {
 }
 
 impl Pipeline<'_, '_> {
-    /// The direction towards a sun that explains the photographs better than the present fit of the light field does; `None` if none
-    /// does.
+    /// The direction towards a sun that explains the photographs better than the present fit of the light field does; `None` if
+    /// none does.
     pub(super) fn find_sun(&self, cache: &PathCache) -> Option<Vec3> {
         // Without light samples, paths would hardly ever meet the sun.
         if self.monitor.settings.light_sampling == LightSampling::Bsdf {

@@ -167,8 +167,8 @@ impl Bvh {
         build::build(positions, triangles)
     }
 
-    /// The hierarchy of a mesh from another builder's binary tree, with leaves merged and nodes collapsed at minimum cost. A triangle
-    /// may be in several leaves.
+    /// The hierarchy of a mesh from another builder's binary tree, with leaves merged and nodes collapsed at minimum cost. A
+    /// triangle may be in several leaves.
     pub fn from_tree(positions: &[Vec3], triangles: &[[u32; 3]], tree: &Tree) -> Self {
         build::from_tree(positions, triangles, tree)
     }

@@ -59,8 +59,8 @@ impl<L: Lanes<GROUP>> Shear<L> {
     /// Intersects the line with a group's triangles beyond `t_min`: returns the mask of hits, t, and the unnormalised barycentric
     /// coordinates v, w and their total.
     ///
-    /// Watertight (Woop, Benthin and Wald 2013): the edge function of sheared corners is a difference of two rounded products, which
-    /// never has the wrong sign; zero counts as inside.
+    /// Watertight (Woop, Benthin and Wald 2013): the edge function of sheared corners is a difference of two rounded products,
+    /// which never has the wrong sign; zero counts as inside.
     #[inline(always)]
     fn cross(&self, group: &Group) -> (u32, L, [L; 3]) {
         let [ax, ay, az] = self.corner(group, 0);

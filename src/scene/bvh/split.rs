@@ -103,8 +103,8 @@ impl Bin {
     }
 }
 
-/// Reorders primitives so that those left of the plane of minimum surface area cost come first; returns their number. Where no plane
-/// separates the centres, it is the first half.
+/// Reorders primitives so that those left of the plane of minimum surface area cost come first; returns their number. Where no
+/// plane separates the centres, it is the first half.
 pub(super) fn split(primitives: &mut [Primitive]) -> usize {
     let (low, high) = primitives
         .iter()
