@@ -426,7 +426,7 @@ fn rooms_that_are_in_the_table_are_not_solved_again() {
         error
             .expect_err("another table")
             .to_string()
-            .contains("rooms.csv:1")
+            .contains("rooms.csv:2")
     );
 }
 
@@ -436,7 +436,8 @@ fn quantiles_and_pooled_figures_are_those_of_the_rows() {
     let row = |i: u64| Row {
         relit: env!("CARGO_PKG_VERSION").to_owned(),
         preset: "balanced".to_owned(),
-        size: TINY,
+        width: TINY[0],
+        height: TINY[1],
         family: Family::Glossy,
         seed: i,
         seconds: 2.0 * i as f64,

@@ -11,7 +11,7 @@ use crate::say;
 use crate::session::command::Source;
 use crate::session::open::open;
 use crate::study::experiments::{Bench, STUDIES, Study};
-use crate::study::families::{Decision, Plan, composite, table};
+use crate::study::families::{CompositeRow, Decision, Plan, Rows, composite};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use std::path::PathBuf;
@@ -109,7 +109,8 @@ pub fn study(arguments: &StudyArguments) -> Result<()> {
     Ok(())
 }
 
-/// Runs the study `insertion` over generated rooms: writes insertion-FAMILY.csv and prints the decision over all rooms.
+/// Runs the study `insertion` over generated rooms that insertion-FAMILY.csv lacks, and prints the decision over all
+/// rooms.
 ///
 /// # Errors
 /// A room cannot be generated or solved, or the table cannot be written.
@@ -121,28 +122,32 @@ fn insertions(arguments: &StudyArguments, rooms: u32, family: &str) -> Result<()
         let problem = format!("`{}` is not run over generated rooms", arguments.name);
         return Err(Error::usage("--rooms", problem, "name the study insertion"));
     };
-    let seeds: Vec<u64> = (1..=u64::from(rooms)).collect();
     let plan = Plan {
         families: vec![family],
-        seeds: seeds.clone(),
+        seeds: (1..=u64::from(rooms)).collect(),
         size: SIZE,
         preset,
     };
-    let mut rows = Vec::new();
-    let name = format!("insertion-{}.csv", family.name());
-    let file = arguments.out.join(name);
-    for seed in seeds {
+    let file = (arguments.out).join(format!("insertion-{}.csv", family.name()));
+    let mut rows: Rows<CompositeRow> = Rows::open(file.clone())?;
+    for &seed in &plan.seeds {
+        if let Some(row) = rows.find(&plan, family, seed) {
+            say::note(row.words());
+            continue;
+        }
         say::note(format_args!("{} room {seed} …", family.name()));
         match composite(family, seed, &plan)? {
             Some(row) => {
                 say::note(row.words());
-                rows.push(row);
-                table(&rows).write(&file)?;
+                rows.append(row)?;
             }
             None => say::note("  no free place on its floor that photographs see"),
         }
     }
-    say::line(Decision::of(&rows).words());
+    let solved: Vec<&CompositeRow> = (plan.seeds.iter())
+        .filter_map(|&seed| rows.find(&plan, family, seed))
+        .collect();
+    say::line(Decision::of(&solved).words());
     say::line(file.display());
     Ok(())
 }

@@ -1,7 +1,10 @@
 //! The families of generated rooms.
 
+use serde::{Deserialize, Serialize};
+
 /// A kind of generated room. Its number is a key of the random numbers of its rooms.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Family {
     /// Lamps in view.
     Plain = 0,

@@ -7,7 +7,6 @@ use crate::compose::object::ObjectModel;
 use crate::compose::placement::{PlacedObject, Placement};
 use crate::compose::world::FurnishedScene;
 use crate::error::{Error, Result};
-use crate::export::table::Table;
 use crate::math::color::linear_to_srgb;
 use crate::math::picture::Picture;
 use crate::math::stats::quantile;
@@ -16,11 +15,13 @@ use crate::room::shape::Modeller;
 use crate::scene::Scene;
 use crate::study::experiments::{Cylinder, chair, insert, places, up, upright};
 use crate::study::families::Plan;
+use crate::study::families::row::{RoomRow, SolveKey};
 use crate::study::families::score::{Solved, solved};
 use crate::transport::lit::LitScene;
 use crate::transport::material::Material;
 use crate::transport::path::PathOptions;
 use glam::{DAffine3, Vec3};
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// The chair's reflectance.
@@ -45,8 +46,16 @@ const CHANGED: f32 = 0.025;
 const MAX_POWER: u32 = 6;
 
 /// Comparison of the composites in a room with the truth; means over its photographs.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct CompositeRow {
+    /// The program's version.
+    pub relit: String,
+    /// Name of the preset.
+    pub preset: String,
+    /// Width of the photographs in pixels.
+    pub width: u32,
+    /// Height of the photographs in pixels.
+    pub height: u32,
     /// The room's family.
     pub family: Family,
     /// Its seed.
@@ -54,14 +63,18 @@ pub struct CompositeRow {
     /// Seconds of the solve.
     pub seconds: f64,
     /// PSNR of the composite in dB over the chair, displayed at the photograph's exposure.
+    #[serde(rename = "chair_psnr")]
     pub chair: f64,
     /// The same of the naive composite.
+    #[serde(rename = "naive_psnr")]
     pub naive: f64,
     /// Ratio of the chair's brightness to the true one.
     pub brightness: f64,
     /// PSNR of the composite in dB over shadow and bleed; `None` if the chair changes no pixel beside it.
+    #[serde(rename = "shadow_psnr")]
     pub shadow: Option<f64>,
     /// The same of the photograph without the chair.
+    #[serde(rename = "untouched_psnr")]
     pub untouched: Option<f64>,
     /// Least-squares slope of the composite's change there over the true change, over all its photographs; 1 is right.
     pub slope: Option<f64>,
@@ -91,6 +104,10 @@ pub fn composite(family: Family, seed: u64, plan: &Plan) -> Result<Option<Compos
     let frames = changed.len() as f64;
     let around = |mean: f64| (!changed.is_empty()).then_some(mean);
     Ok((!scores.is_empty()).then(|| CompositeRow {
+        relit: env!("CARGO_PKG_VERSION").to_owned(),
+        preset: plan.preset.word().to_owned(),
+        width: plan.size[0],
+        height: plan.size[1],
         family,
         seed,
         seconds: solved.solution.progress.seconds,
@@ -101,6 +118,13 @@ pub fn composite(family: Family, seed: u64, plan: &Plan) -> Result<Option<Compos
         untouched: around(untouched / frames),
         slope: around(product / square),
     }))
+}
+
+impl RoomRow for CompositeRow {
+    fn solve(&self) -> SolveKey<'_> {
+        let size = [self.width, self.height];
+        (&self.relit, &self.preset, size, self.family, self.seed)
+    }
 }
 
 impl CompositeRow {
@@ -139,10 +163,10 @@ pub struct Decision {
 
 impl Decision {
     /// Summarizes rooms.
-    pub fn of(rows: &[CompositeRow]) -> Self {
+    pub fn of(rows: &[&CompositeRow]) -> Self {
         let mut gains: Vec<f64> = rows.iter().map(|row| row.chair - row.naive).collect();
         let count =
-            |holds: &dyn Fn(&CompositeRow) -> bool| rows.iter().filter(|r| holds(r)).count();
+            |holds: &dyn Fn(&CompositeRow) -> bool| rows.iter().filter(|&&r| holds(r)).count();
         Self {
             rooms: rows.len(),
             better: gains.iter().filter(|&&gain| gain > 0.0).count(),
@@ -166,27 +190,6 @@ impl Decision {
              {bright}; slope of shadow and bleed 0.7 to 1.3 in {strong}"
         )
     }
-}
-
-/// The rows as a table.
-pub fn table(rows: &[CompositeRow]) -> Table {
-    let mut table = Table::new(
-        "family,seed,seconds,chair_psnr,naive_psnr,brightness,shadow_psnr,untouched_psnr,slope",
-    );
-    for row in rows {
-        table.row(&[
-            row.family.name().into(),
-            row.seed.into(),
-            row.seconds.into(),
-            row.chair.into(),
-            row.naive.into(),
-            row.brightness.into(),
-            row.shadow.into(),
-            row.untouched.into(),
-            row.slope.into(),
-        ]);
-    }
-    table
 }
 
 /// A chair on the true floor, in the room's coordinates.

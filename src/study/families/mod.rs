@@ -1,7 +1,7 @@
 //! Solves of generated rooms by family, compared with their truth: what holds over many rooms instead of one capture.
 //!
-//! Each room is a row of rooms.csv, which is written as soon as it is solved; existing rows are not solved again.
-//! rooms.json and rooms.png summarize all rows of one program version, preset and size.
+//! Each room is a row of a table, which is written as soon as it is solved; existing rows are not solved again.
+//! rooms.json and rooms.png summarize all rows of rooms.csv of one program version, preset and size.
 
 mod composite;
 mod lamps;
@@ -11,9 +11,9 @@ mod score;
 mod segments;
 mod summary;
 
-pub use composite::{CompositeRow, Decision, composite, table};
+pub use composite::{CompositeRow, Decision, composite};
 pub use plot::plot;
-pub use row::{Row, Rows};
+pub use row::{RoomRow, Row, Rows, SolveKey};
 pub use score::measure;
 pub use summary::{Quantiles, Summary, summarize};
 
@@ -57,10 +57,10 @@ pub fn run(
     stopped: &dyn Fn() -> bool,
     report: &mut dyn FnMut(RoomEvent),
 ) -> Result<Summary> {
-    let mut rows = Rows::open(folder)?;
+    let mut rows: Rows<Row> = Rows::open(folder.join("rooms.csv"))?;
     for &family in &plan.families {
         for &seed in &plan.seeds {
-            if stopped() || rows.holds(plan, family, seed) {
+            if stopped() || rows.find(plan, family, seed).is_some() {
                 continue;
             }
             report(RoomEvent::Begins(family, seed));

@@ -1,28 +1,35 @@
-//! rooms.csv: one row for each solved room.
+//! Tables with one row for each solved room, such as rooms.csv.
 
 use crate::error::{Error, Result};
 use crate::export::atomic::write_bytes;
-use crate::export::table::{Cell, Table};
 use crate::room::generated::Family;
 use crate::study::families::Plan;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use std::fs::OpenOptions;
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-const COLUMNS: &str = "relit,preset,width,height,family,seed,seconds,objects,albedo_mae,albedo_rel_median,albedo_psnr,\
-    lamps_true,lamps_found,lamps_false,albedos,coverage_1,coverage_2,rays,albedo_factor";
-/// Number of [`COLUMNS`].
-const COUNT: usize = 19;
+/// A room that was solved, as a row of a table.
+pub trait RoomRow: Serialize + DeserializeOwned {
+    /// How and which room was solved.
+    fn solve(&self) -> SolveKey<'_>;
+}
+
+/// Program version, name of the preset, width and height of the photographs, family and seed.
+pub type SolveKey<'a> = (&'a str, &'a str, [u32; 2], Family, u64);
 
 /// Comparison of a solved room with its truth.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// The program's version.
     pub relit: String,
     /// Name of the preset.
     pub preset: String,
-    /// Width and height of the photographs in pixels.
-    pub size: [u32; 2],
+    /// Width of the photographs in pixels.
+    pub width: u32,
+    /// Height of the photographs in pixels.
+    pub height: u32,
     /// The room's family.
     pub family: Family,
     /// Its seed.
@@ -55,146 +62,107 @@ pub struct Row {
     pub albedo_factor: Option<f64>,
 }
 
-impl Row {
-    /// Whether the row has the plan's program version, preset and size.
-    pub fn belongs_to(&self, plan: &Plan) -> bool {
-        self.relit == env!("CARGO_PKG_VERSION")
-            && self.preset == plan.preset.word()
-            && self.size == plan.size
-    }
-
-    fn cells(&self) -> [Cell; COUNT] {
-        [
-            self.relit.as_str().into(),
-            self.preset.as_str().into(),
-            u64::from(self.size[0]).into(),
-            u64::from(self.size[1]).into(),
-            self.family.name().into(),
-            self.seed.into(),
-            self.seconds.into(),
-            self.objects.into(),
-            self.albedo_mae.into(),
-            self.albedo_rel_median.into(),
-            self.albedo_psnr.into(),
-            self.lamps_true.into(),
-            self.lamps_found.into(),
-            self.lamps_false.into(),
-            self.albedos.into(),
-            self.coverage_1.into(),
-            self.coverage_2.into(),
-            self.rays.into(),
-            self.albedo_factor.into(),
-        ]
-    }
-
-    /// Parses a line; `None` if it is incomplete.
-    fn parse(line: &str) -> Option<Self> {
-        let fields: Vec<&str> = line.split(',').collect();
-        let fields: [&str; COUNT] = fields.try_into().ok()?;
-        let optional = |text: &str| match text {
-            "" => Some(None),
-            text => text.parse::<f64>().ok().map(Some),
-        };
-        let whole = |index: usize| fields[index].parse::<u64>().ok();
-        Some(Self {
-            relit: fields[0].to_owned(),
-            preset: fields[1].to_owned(),
-            size: [fields[2].parse().ok()?, fields[3].parse().ok()?],
-            family: Family::of_name(fields[4])?,
-            seed: whole(5)?,
-            seconds: fields[6].parse().ok()?,
-            objects: whole(7)?,
-            albedo_mae: optional(fields[8])?,
-            albedo_rel_median: optional(fields[9])?,
-            albedo_psnr: optional(fields[10])?,
-            lamps_true: whole(11)?,
-            lamps_found: whole(12)?,
-            lamps_false: whole(13)?,
-            albedos: whole(14)?,
-            coverage_1: optional(fields[15])?,
-            coverage_2: optional(fields[16])?,
-            rays: whole(17)?,
-            albedo_factor: optional(fields[18])?,
-        })
+impl RoomRow for Row {
+    fn solve(&self) -> SolveKey<'_> {
+        let size = [self.width, self.height];
+        (&self.relit, &self.preset, size, self.family, self.seed)
     }
 }
 
-/// The rows of a folder's rooms.csv, which grows row by row.
+/// The rows of a table, which grows row by row.
 #[derive(Debug)]
-pub struct Rows {
+pub struct Rows<R> {
     path: PathBuf,
-    rows: Vec<Row>,
+    rows: Vec<R>,
 }
 
-impl Rows {
-    /// Reads rooms.csv, or creates it. Removes an incomplete last line.
+impl<R: RoomRow> Rows<R> {
+    /// Reads a table, which may be absent. Removes an incomplete last line.
     ///
     /// # Errors
     /// The file cannot be read or written, or is another table.
-    pub fn open(folder: &Path) -> Result<Self> {
-        let path = folder.join("rooms.csv");
+    pub fn open(path: PathBuf) -> Result<Self> {
+        let io = |error: std::io::Error| Error::io(&path, &error);
         let text = match std::fs::read_to_string(&path) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
-            Err(error) => return Err(Error::io(&path, &error)),
+            Err(error) => return Err(io(error)),
         };
-        let mut table = Table::new(COLUMNS);
-        let mut rows = Vec::new();
-        if !text.is_empty() {
-            let another = |line: usize| {
-                Error::new(
-                    format!("{}:{line}", path.display()),
-                    "is no row of this program's table of rooms",
-                    "name another folder with --out",
-                )
-            };
-            let mut lines = text.split_inclusive('\n').enumerate();
-            let header = lines.next().map(|(_, line)| line.trim_end());
-            if header != Some(COLUMNS) {
-                return Err(another(1));
-            }
-            for (index, line) in lines {
-                match Row::parse(line.trim_end()).filter(|_| line.ends_with('\n')) {
-                    Some(row) => rows.push(row),
-                    None if !line.ends_with('\n') => {}
-                    None => return Err(another(index + 1)),
-                }
-            }
+        let another = |line: usize| {
+            Error::new(
+                format!("{}:{line}", path.display()),
+                "is no row of this program's table of rooms",
+                "name another folder with --out",
+            )
+        };
+        let end = text.rfind('\n').map_or(0, |end| end + 1);
+        let rows: Vec<R> = csv::Reader::from_reader(&text.as_bytes()[..end])
+            .deserialize()
+            .enumerate()
+            .map(|(index, row)| row.map_err(|_| another(index + 2)))
+            .collect::<Result<_>>()?;
+        let header = match rows.first() {
+            Some(row) => lines(row, true).map_err(io)?,
+            None => Vec::new(),
+        };
+        let first = text.split_inclusive('\n').next().unwrap_or_default();
+        if !header.starts_with(first.as_bytes()) && end == text.len() {
+            return Err(another(1));
         }
-        for row in &rows {
-            table.row(&row.cells());
-        }
-        if table.as_str() != text {
-            write_bytes(&path, table.as_str().as_bytes())?;
+        if end < text.len() {
+            write_bytes(&path, &text.as_bytes()[..end])?;
         }
         Ok(Self { path, rows })
     }
 
-    /// Whether a room has been solved according to a plan.
-    pub fn holds(&self, plan: &Plan, family: Family, seed: u64) -> bool {
-        self.of(plan)
-            .any(|row| row.family == family && row.seed == seed)
+    /// The row of a room that was solved according to a plan.
+    pub fn find(&self, plan: &Plan, family: Family, seed: u64) -> Option<&R> {
+        let key = (
+            env!("CARGO_PKG_VERSION"),
+            plan.preset.word(),
+            plan.size,
+            family,
+            seed,
+        );
+        self.rows.iter().find(|row| row.solve() == key)
     }
 
-    /// The rows that belong to a plan.
-    pub fn of<'a>(&'a self, plan: &'a Plan) -> impl Iterator<Item = &'a Row> {
-        self.rows.iter().filter(|row| row.belongs_to(plan))
+    /// The rows of the plan's program version, preset and size.
+    pub fn of<'a>(&'a self, plan: &'a Plan) -> impl Iterator<Item = &'a R> {
+        self.rows.iter().filter(|row| {
+            let (relit, preset, size, ..) = row.solve();
+            (relit, preset, size) == (env!("CARGO_PKG_VERSION"), plan.preset.word(), plan.size)
+        })
     }
 
     /// Appends a row, also to the file.
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn append(&mut self, row: Row) -> Result<()> {
-        let line = Table::line(&row.cells());
+    pub fn append(&mut self, row: R) -> Result<()> {
         let io = |error: std::io::Error| Error::io(&self.path, &error);
+        if let Some(folder) = self.path.parent() {
+            std::fs::create_dir_all(folder).map_err(io)?;
+        }
         let mut file = OpenOptions::new()
             .append(true)
+            .create(true)
             .open(&self.path)
             .map_err(io)?;
-        file.write_all(line.as_bytes()).map_err(io)?;
+        let is_new = file.metadata().map_err(io)?.len() == 0;
+        let bytes = lines(&row, is_new).map_err(io)?;
+        file.write_all(&bytes).map_err(io)?;
         file.sync_data().map_err(io)?;
         self.rows.push(row);
         Ok(())
     }
+}
+
+/// A row as a line, after the names of its columns if asked for.
+fn lines<R: Serialize>(row: &R, header: bool) -> std::io::Result<Vec<u8>> {
+    let mut lines = csv::WriterBuilder::new()
+        .has_headers(header)
+        .from_writer(Vec::new());
+    lines.serialize(row)?;
+    lines.into_inner().map_err(csv::IntoInnerError::into_error)
 }

@@ -94,7 +94,8 @@ pub fn measure(family: Family, seed: u64, plan: &Plan) -> Result<Row> {
     Ok(Row {
         relit: env!("CARGO_PKG_VERSION").to_owned(),
         preset: plan.preset.word().to_owned(),
-        size: plan.size,
+        width: plan.size[0],
+        height: plan.size[1],
         family,
         seed,
         seconds: solution.progress.seconds,
