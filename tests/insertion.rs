@@ -328,10 +328,10 @@ fn an_object_darkens_the_floor_beside_it() {
     assert!(changed.count() > 50);
 }
 
-/// A first look of a photograph three times as large as its render, against the converged composite.
+/// A first look of a photograph twice as large as its render, against the converged composite.
 #[test]
 fn the_first_look_has_exact_outlines_and_light_better_than_a_sample_of_each_pixel() {
-    const LARGE: u32 = 600;
+    const LARGE: u32 = 400;
     let mut capture = lamp_room().0;
     let frame = &mut capture.frames[0];
     let factor = f64::from(LARGE) / f64::from(SIDE);

@@ -23,7 +23,7 @@ fn room_without(names: &[&str]) -> (Problem, Vec<Material>) {
     ]
     .map(|(center, target)| (DVec3::from_array(center), DVec3::from_array(target)));
     let views: Vec<_> = scenes::room_views().into_iter().chain(more).collect();
-    let size = [64, 48];
+    let size = [48, 36];
     let (whole, materials) = scenes::lamp_room();
     let whole = scenes::capture(whole, &views, size);
     let photographs = scenes::photographed(&whole, &materials, 256, 67).photographs;
@@ -66,7 +66,7 @@ fn a_lamp_that_the_mesh_lacks() {
     let [with, without] = [true, false].map(run);
     let [with, without] = [with, without].map(|s| errors(&s.estimate, &materials));
     println!("errors with light from outside {with:?}, without {without:?}");
-    // 0.180 and 0.913 are seen.
+    // 0.178 and 1.000 are seen.
     let [with, without] = [with, without].map(median);
     assert!(with < 0.20 && without > 0.8, "{with} {without}");
 }
@@ -81,7 +81,7 @@ fn a_lamp_that_a_scan_lacks_is_found_near_by() {
     assert!(matches!(outside.surroundings, Surroundings::Box { .. }));
     let errors = errors(&solution.estimate, &materials);
     println!("errors {errors:?}");
-    // 0.172 is seen.
+    // 0.173 is seen.
     assert!(median(errors.clone()) < 0.2, "{errors:?}");
 }
 
@@ -90,28 +90,19 @@ fn a_lamp_that_a_scan_lacks_is_found_near_by() {
 #[test]
 fn a_part_that_the_mesh_lacks() {
     let (problem, materials) = room_without(&["block"]);
-    let run = |textures: bool| {
-        let settings = Settings {
-            textures,
-            ..Settings::default()
-        };
-        let solution = scenes::solved(&problem, &settings);
-        for stage in &solution.progress.stages {
-            println!("{}: {}", stage.name, stage.why);
-        }
-        solution.estimate
-    };
+    let solution = scenes::solved(&problem, &Settings::default());
+    for stage in &solution.progress.stages {
+        println!("{}: {}", stage.name, stage.why);
+    }
     let lamp = materials.iter().position(|m| m.emission != Vec3::ZERO);
-    for estimate in [true, false].map(run) {
-        let found = errors(&estimate, &materials);
-        println!("errors {found:?}");
-        for (k, object) in estimate.objects.iter().enumerate() {
-            assert_eq!(object.emission != Vec3::ZERO, Some(k) == lamp, "object {k}");
-        }
-        // The floor is 0.131 off with a texture and 0.157 without, all else 0.023 at most.
-        for (k, error) in found.iter().enumerate() {
-            let allowed = if k == FLOOR { 0.18 } else { 0.03 };
-            assert!(*error < allowed, "{k}: {found:?}");
-        }
+    let found = errors(&solution.estimate, &materials);
+    println!("errors {found:?}");
+    for (k, object) in solution.estimate.objects.iter().enumerate() {
+        assert_eq!(object.emission != Vec3::ZERO, Some(k) == lamp, "object {k}");
+    }
+    // The floor is 0.133 off, all else 0.023 at most.
+    for (k, error) in found.iter().enumerate() {
+        let allowed = if k == FLOOR { 0.18 } else { 0.03 };
+        assert!(*error < allowed, "{k}: {found:?}");
     }
 }

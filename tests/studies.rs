@@ -13,14 +13,14 @@ fn study(name: &str) -> &'static Study {
 }
 
 fn quick(name: &str) -> Findings {
-    quick_on(name, None)
+    quick_on(name, 2, None)
 }
 
-fn quick_on(name: &str, subject: Option<&Subject>) -> Findings {
+fn quick_on(name: &str, seeds: u64, subject: Option<&Subject>) -> Findings {
     let bench = Bench {
         quick: true,
         time: Duration::from_secs(1),
-        seeds: 2,
+        seeds,
         subject,
         say: &|_| {},
         show: &|_| {},
@@ -106,7 +106,7 @@ fn every_study_runs_on_a_capture() {
     let twin = format!("twin of {}", room.name);
     for study in STUDIES {
         let name = study.name;
-        let findings = quick_on(name, Some(&subject));
+        let findings = quick_on(name, 1, Some(&subject));
         assert!(
             findings.how.contains(&room.name),
             "{name}: {}",
