@@ -56,8 +56,7 @@ impl<L: Lanes<GROUP>> Shear<L> {
         ]
     }
 
-    /// Intersects the line with a group's triangles beyond `t_min`: returns the mask of hits, t, and the unnormalised barycentric
-    /// coordinates v, w and their total.
+    /// Intersects the line with a group's triangles beyond `t_min`: hits, t, unnormalised barycentrics v, w and their total.
     ///
     /// Watertight (Woop, Benthin and Wald 2013): the edge function of sheared corners is a difference of two rounded products,
     /// which never has the wrong sign; zero counts as inside.
