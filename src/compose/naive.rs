@@ -28,8 +28,7 @@ const PROBE_SIDE: usize = 64;
 /// Sub-pixels along a side, for coverage.
 const GRID: usize = 4;
 
-/// Spherical harmonics of the photographs, as if their light came from infinitely far away. Directions that no photograph shows
-/// get the mean of those that are shown.
+/// Spherical harmonics of the photographs, as if all light came from far away. Directions that none shows get the others' mean.
 pub fn harmonics_of_photographs<'a>(
     frames: impl IntoIterator<Item = (&'a Camera, &'a Picture)>,
 ) -> Harmonics {

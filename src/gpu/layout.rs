@@ -9,11 +9,9 @@ pub(super) const WORKGROUP: u32 = 64;
 pub(super) const NONE: u32 = u32::MAX;
 /// Four-component words per triangle: three corners and the normal.
 pub(super) const TRIANGLE_WORDS: usize = 4;
-/// Kind of albedo: a constant colour.
+/// Kinds of albedo: a constant colour, one colour per texel, and an image times a constant.
 pub(super) const ALBEDO_CONSTANT: u32 = 0;
-/// Kind of albedo: one colour per texel.
 pub(super) const ALBEDO_TEXELS: u32 = 1;
-/// Kind of albedo: an image times a constant.
 pub(super) const ALBEDO_IMAGE: u32 = 2;
 
 /// A type with the same bytes in Rust and WGSL: 16 of them, so that fields of such types lie at WGSL's offsets.
@@ -57,13 +55,9 @@ macro_rules! shared {
 shared! {
     /// Parameters of a dispatch.
     struct Dispatch {
-        /// The camera's centre.
         center: [f32; 4],
-        /// The camera's axis to the right.
         axis_x: [f32; 4],
-        /// The camera's axis upwards.
         axis_y: [f32; 4],
-        /// The camera's axis backwards.
         axis_z: [f32; 4],
         /// Focal lengths and principal point in pixels.
         lens: [f32; 4],
@@ -81,7 +75,6 @@ shared! {
         emitter_fraction: [f32; 4],
     }
 
-    /// A material.
     struct Material {
         /// Constant albedo, or factor on the image.
         albedo: [f32; 4],
@@ -97,7 +90,6 @@ shared! {
         corners: [u32; 4],
     }
 
-    /// The sums of one pixel.
     struct Pixel {
         /// Sum of radiance, and number of samples whose first hit is an inserted object.
         over: [f32; 4],

@@ -188,8 +188,7 @@ impl Tracer {
         Ok(sums)
     }
 
-    /// The nearest hit of each ray, or any hit if `any`. Triangles of inserted objects count after the scene's; `t_min` is taken as
-    /// 0.
+    /// The nearest hit of each ray, or any hit if `any`. Triangles of inserted objects count after the scene's; `t_min` is ignored.
     ///
     /// # Errors
     /// The rays do not fit, or the card failed.

@@ -9,8 +9,7 @@ use std::f32::consts::PI;
 
 /// An equirectangular map of incident radiance, sampled in proportion to luminance × solid angle.
 ///
-/// Directions point towards the light in scene coordinates; the pole is the y axis, independent of `up`. For a box they start at
-/// its centre.
+/// Directions point towards the light in scene coordinates; the pole is y, whatever `up` is. For a box they start at its centre.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Environment {
     width: usize,
@@ -46,8 +45,7 @@ impl Environment {
         })
     }
 
-    /// The map with a sun beyond it that shines through some of its pixels, or through all. `None` if the number of `openings`
-    /// differs.
+    /// The map with a sun beyond it that shines through some or all of its pixels. `None` if the number of `openings` differs.
     pub fn with_sun(self, sun: Option<Sun>, openings: Option<Vec<bool>>) -> Option<Self> {
         let fit = (openings.as_ref()).is_none_or(|open| open.len() == self.pixels.len());
         fit.then_some(Self {
@@ -271,8 +269,7 @@ mod tests {
         assert!(map.with_above(vec![Vec3::ONE; 3], Vec3::X).is_none());
     }
 
-    /// Irradiance of a surface under a sun and a grey box, by samples of the mixture and by samples of the sphere for the map
-    /// alone.
+    /// Irradiance of a surface under a sun and a grey box, by samples of the mixture.
     #[test]
     fn a_sun_gives_its_irradiance_beside_the_map() {
         let sun = Sun {

@@ -8,8 +8,7 @@ const GAP: f32 = 0.02;
 
 /// How rays map to directions of the environment map.
 ///
-/// A box is a parallax-corrected environment map: a ray maps to the direction from the box's centre to the point where it leaves
-/// the box.
+/// A box is a parallax-corrected environment map: a ray maps to the direction from the box's centre to where it leaves the box.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub enum Surroundings {
     /// Infinitely far: light depends on direction only.

@@ -1,7 +1,6 @@
 //! Rooms generated at random from a seed, in families. Settings are chosen and tested on them instead of on captures.
 //!
-//! Each family has its own difficulty. Its rooms differ in size, light, colours and number of photographs. The same
-//! (family, seed, size) gives the same bits.
+//! Each family has its own difficulty. Rooms differ in size, light, colours and views. (Family, seed, size) gives the same bits.
 
 mod clutter;
 mod family;
@@ -45,8 +44,7 @@ fn draft(family: Family, seed: u64, size: [u32; 2]) -> Draft {
     Draft::new(family, seed, size, furnisher)
 }
 
-/// Plain room `seed` and the rendering of its photographs at a size in pixels, with 8 to 64 samples per pixel, so
-/// that their noise varies widely.
+/// Plain room `seed` and the rendering of its photographs at a size in pixels, with 8 to 64 samples per pixel.
 pub fn generate(seed: u64, size: [u32; 2]) -> (Room, Rendering) {
     let plain = draft(Family::Plain, seed, size);
     (plain.room, plain.rendering)

@@ -22,13 +22,9 @@ const PHOTOGRAPH_KEY: u64 = 0x6e6f_6973_6500;
 
 /// A room, its light from outside, and the settings of its photographs.
 pub struct Draft {
-    /// Its family.
     pub family: Family,
-    /// Its seed.
     pub seed: u64,
-    /// Mesh, materials and views.
     pub room: Room,
-    /// Light from outside.
     pub outside: Option<Arc<Environment>>,
     /// Random seed, samples and size of its photographs.
     pub rendering: Rendering,
@@ -50,18 +46,11 @@ impl Draft {
                 views: furnisher.views,
             },
             outside: furnisher.outside,
-            rendering: Rendering {
-                seed: splitmix64(seed ^ PHOTOGRAPH_KEY),
-                samples: furnisher.samples,
-                size,
-            },
+            rendering: Rendering::new(splitmix64(seed ^ PHOTOGRAPH_KEY), furnisher.samples, size),
         }
     }
 
-    /// The room with its true materials and light.
-    ///
-    /// # Errors
-    /// As [`Room::lit`].
+    /// The room with its true materials and light. Fails as [`Room::lit`] does.
     pub fn lit(&self) -> Result<LitScene> {
         let lit = self.room.lit(self.rendering.size)?;
         Ok(LitScene {
@@ -88,11 +77,9 @@ pub struct Generated {
     pub family: Family,
     /// Its seed.
     pub seed: u64,
-    /// Input of a solver: mesh and photographs in memory. If `capture.segmentation` is set, the mesh is to be cut into segments
-    /// like that of a scan.
+    /// Input of a solver: mesh and photographs in memory. If `capture.segmentation` is set, the mesh is to be segmented.
     pub capture: Capture,
-    /// The true room, of which the photographs were rendered: geometry, materials, light and cameras, in the capture's order of
-    /// frames.
+    /// The true room, as photographed: geometry, materials, light and cameras, in the capture's order of frames.
     pub lit: LitScene,
 }
 

@@ -87,23 +87,3 @@ pub fn hit_error(room: &Room, scene: &Scene, met: &[bool], size: f64) -> f64 {
     }
     quantile(&mut errors, QUANTILE).unwrap_or(f64::NAN)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::study::experiments::box_room::standard;
-
-    #[test]
-    fn hits_are_exact_at_any_size_and_lost_beside_something_very_far_away() {
-        let room = standard();
-        let error = |(room, size): (Room, f64)| {
-            let lit = room.lit([16, 12]).expect("a scene");
-            hit_error(&room, &lit.scene, &[true; 16 * 12 * 6], size)
-        };
-        for factor in [1e-3, 1.0, 1e3] {
-            assert!(error(scaled(&room, factor)) < 1e-6);
-        }
-        let [near, far] = [10.0, 1e6].map(|distance| error(with_outlier(&room, distance)));
-        assert!(near < 1e-5 && far > 1e-3, "{near} {far}");
-    }
-}

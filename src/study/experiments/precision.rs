@@ -6,15 +6,13 @@ use crate::export::table::Table;
 use crate::inverse::settings::{Preset, Settings};
 use crate::study::experiments::box_room;
 use crate::study::experiments::course::{cache_settings, solved};
-use crate::study::experiments::findings::{Findings, Summary, brief};
 use crate::study::experiments::moved::{self, hit_error};
-use crate::study::experiments::study::{Bench, Study};
+use crate::study::experiments::study::{Bench, Findings, Study, Summary, brief};
 use crate::study::experiments::summed::Paths;
 use crate::study::experiments::twin::studied;
 use crate::study::subject::Subject;
 use glam::Vec3;
 
-/// The study.
 pub const STUDY: Study = Study {
     name: "precision",
     question: "Rays and path weights are kept in 32 bits, sums in 64. Over sizes, distances from the origin, numbers of paths \
@@ -30,7 +28,6 @@ const TOLERABLE: f64 = 1e-3;
 struct Line {
     axis: &'static str,
     quantity: &'static str,
-    /// Largest tolerable error.
     tolerable: f64,
     /// Parameter value and error.
     points: Vec<(f64, f64)>,
@@ -42,7 +39,7 @@ fn run(bench: &Bench) -> Result<Findings> {
         (low..=high).step_by(step).map(|k| 10f64.powi(k)).collect()
     };
     let studied = studied(bench, box_room::rendering(true))?;
-    let subject = studied.photographed()?;
+    let subject = Subject::of_room(&studied.room, &studied.rendering)?;
     let (words, room) = (studied.words, studied.room);
     let reflects: Vec<bool> = (room.materials.iter())
         .map(|material| material.emission == Vec3::ZERO)

@@ -11,8 +11,7 @@ use crate::export::table::Table;
 use crate::room;
 use crate::room::generated::Family;
 use crate::scene::Scene;
-use crate::study::experiments::findings::{Findings, Summary};
-use crate::study::experiments::study::{Bench, Study};
+use crate::study::experiments::study::{Bench, Findings, Study, Summary};
 use crate::study::trade::rooms;
 
 /// The study.

@@ -23,7 +23,6 @@ const UNIFORM_FRACTION: f64 = 0.2;
 pub struct Groups {
     /// For each group, its pixels as (frame, pixel).
     pixels: Vec<Vec<(u32, u32)>>,
-    /// Probabilities of the groups.
     probabilities: Cumulative,
     total: usize,
     /// Whether gradients are weighted to be unbiased for uniform draws.
@@ -84,7 +83,6 @@ impl Groups {
         }
     }
 
-    /// Draws a pixel.
     pub fn draw(&self, stream: &mut Stream) -> Option<Drawn> {
         let at = stream.uniform_f64();
         let group = self.probabilities.index_at(at)?;

@@ -4,7 +4,6 @@
 //! rooms.json and rooms.png summarize all rows of rooms.csv of one program version, preset and size.
 
 mod composite;
-mod lamps;
 mod plot;
 mod row;
 mod score;
@@ -46,8 +45,7 @@ pub enum RoomEvent<'a> {
     Failed(&'a Error),
 }
 
-/// Solves the rooms that rooms.csv in `folder` lacks, until `stopped`; then writes rooms.json and rooms.png over all
-/// rows that belong to the plan.
+/// Solves rooms that rooms.csv in `folder` lacks, until `stopped`; then writes rooms.json and rooms.png over all rows of the plan.
 ///
 /// # Errors
 /// A file cannot be read or written, or rooms.csv is another table. Rooms that cannot be solved are reported and left out.

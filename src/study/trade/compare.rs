@@ -21,8 +21,7 @@ fn first_to_reach<'a>(
         .min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Compares the presets with the paper's descent: times to an albedo error of 0.02, and to the smallest error that any descent
-/// reached.
+/// Compares the presets with the paper's descent: times to an albedo error of 0.02, and to the smallest error of any descent.
 pub fn against_paper(curves: &[Curve]) -> Vec<String> {
     let is_paper = |curve: &&Curve| curve.settings.preset == Preset::Paper;
     let paper = || curves.iter().filter(is_paper);
