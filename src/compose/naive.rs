@@ -53,10 +53,8 @@ pub fn harmonics_of_photographs<'a>(
             }
         }
     }
-    let means: Vec<Option<DVec3>> = cells
-        .iter()
-        .map(|(sum, n)| (*n > 0).then(|| *sum / f64::from(*n)))
-        .collect();
+    let mean = |(sum, n): &(DVec3, u32)| (*n > 0).then(|| *sum / f64::from(*n));
+    let means: Vec<Option<DVec3>> = cells.iter().map(mean).collect();
     let seen = means.iter().flatten().count().max(1) as f64;
     let mean = means.iter().flatten().sum::<DVec3>() / seen;
 

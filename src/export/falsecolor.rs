@@ -106,12 +106,8 @@ fn write(
         let fraction = x as f32 / bar as f32;
         let color = color_of((low + (high - low) * fraction) / high);
         let column = RgbImage::from_pixel(1, 10, Rgb(color));
-        replace(
-            &mut image,
-            &column,
-            (margin + x).into(),
-            (height + 5).into(),
-        );
+        let (x, y) = (margin + x, height + 5);
+        replace(&mut image, &column, x.into(), y.into());
     }
     let middle = (low + high) * 0.5;
     let labels = [

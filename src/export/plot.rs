@@ -250,13 +250,11 @@ pub fn loss_plot(losses: &[LossPoint], fits: &[FitPoint], stages: &[Stage]) -> P
         start += stage.seconds;
         (start - stage.seconds, stage.name.clone())
     };
+    let residuals = fits.iter().map(|p| [p.seconds, p.residual]);
     let series = [
         curve("in the fit", |p| p.train),
         curve("held out", |p| p.held_out),
-        Series::line(
-            "residual, relative",
-            fits.iter().map(|p| [p.seconds, p.residual]),
-        ),
+        Series::line("residual, relative", residuals),
     ];
     Plot {
         title: "Loss".to_owned(),

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! card       adapters, the device, its errors
-//! layout     structs and constants shared with the shader
+//! layout     the shader's source, and the structs and constants that it shares
 //! shaders/   the path tracer, in modules named as in `transport`
 //! scene      hierarchy, triangles, materials and lights in the shader's layout
 //! tracer     a scene on the card: pictures, pairs of pictures, single rays
@@ -19,7 +19,6 @@ mod lights;
 mod materials;
 mod pace;
 mod scene;
-mod shader;
 mod tracer;
 
 pub use card::{Adapters, Card};

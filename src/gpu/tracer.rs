@@ -2,11 +2,12 @@
 
 use crate::error::Result;
 use crate::gpu::card::Card;
-use crate::gpu::layout::{BINDINGS, Dispatch, FILM, Material, NONE, Pixel, WORKGROUP};
+use crate::gpu::layout::{
+    BINDINGS, Dispatch, FILM, INSERT, Material, NONE, Pixel, RENDER, TRACE, WORKGROUP, source,
+};
 use crate::gpu::materials::Inserted;
 use crate::gpu::pace::Pace;
 use crate::gpu::scene::Packed;
-use crate::gpu::shader::{INSERT, RENDER, TRACE, source};
 use crate::math::rng::splitmix64;
 use crate::scene::camera::Camera;
 use crate::scene::geometry::{Hit, Ray};

@@ -79,11 +79,8 @@ fn mask(
     let ratio = aspect(width, height) / aspect(photograph.width, photograph.height);
     let matches = width > 0 && height > 0 && (ratio - 1.0).abs() < ASPECT_TOLERANCE;
     if !matches {
-        return Err(Error::file(
-            path,
-            "has another aspect ratio than its photograph",
-            "its pixels are not compared",
-        ));
+        let problem = "has another aspect ratio than its photograph";
+        return Err(Error::file(path, problem, "its pixels are not compared"));
     }
     let size = Vec2::new(photograph.width as f32, photograph.height as f32);
     let camera = &scene.cameras[frame];

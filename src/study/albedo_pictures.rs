@@ -4,8 +4,8 @@ use crate::capture::truth::Truth;
 use crate::capture::{Capture, Frame};
 use crate::error::Result;
 use crate::inverse::estimate::Estimate;
-use crate::scene::Scene;
 use crate::scene::camera::Camera;
+use crate::scene::{Object, Scene};
 use crate::transport::material::Material;
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
@@ -57,11 +57,8 @@ pub fn compare(
     true_albedo: impl Fn(usize, &Frame) -> Result<Option<Vec<Vec3>>>,
 ) -> Result<PictureErrors> {
     let materials = estimate.materials();
-    let emitters: Vec<bool> = scene
-        .objects
-        .iter()
-        .map(|o| truth.objects.get(&o.name).is_some_and(|t| t.is_emitter()))
-        .collect();
+    let emits = |o: &Object| (truth.objects.get(&o.name)).is_some_and(|t| t.is_emitter());
+    let emitters: Vec<bool> = scene.objects.iter().map(emits).collect();
     let mut errors = PictureErrors {
         objects: vec![(0, DVec3::ZERO, 0.0); scene.objects.len()],
         ..PictureErrors::default()
@@ -150,12 +147,9 @@ mod tests {
             values: 6,
             objects,
         };
-        assert!(errors.psnr().is_some_and(|d| (d - 20.0).abs() < 1e-9));
-        let constant = errors.psnr_constant_per_object();
-        assert!(
-            constant.is_some_and(|d| (d - 20.0).abs() < 1e-9),
-            "{constant:?}"
-        );
+        for found in [errors.psnr(), errors.psnr_constant_per_object()] {
+            assert!(found.is_some_and(|d| (d - 20.0).abs() < 1e-9), "{found:?}");
+        }
         assert_eq!(PictureErrors::default().psnr(), None);
     }
 }

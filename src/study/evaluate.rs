@@ -104,11 +104,8 @@ impl Reference {
                 Some((object.name.clone(), errors))
             })
             .collect();
-        let scored: Vec<&ObjectErrors> = per_object
-            .iter()
-            .map(|(_, errors)| errors)
-            .filter(|errors| errors.scored)
-            .collect();
+        let all = per_object.iter().map(|(_, errors)| errors);
+        let scored: Vec<&ObjectErrors> = all.filter(|errors| errors.scored).collect();
         let absolute: Vec<f64> = scored
             .iter()
             .flat_map(|o| {

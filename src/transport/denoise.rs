@@ -313,11 +313,8 @@ mod tests {
     }
 
     fn error(a: &Picture, b: &Picture) -> f32 {
-        let squares = a
-            .pixels
-            .iter()
-            .zip(&b.pixels)
-            .map(|(a, b)| (*a - *b).length_squared());
+        let pairs = a.pixels.iter().zip(&b.pixels);
+        let squares = pairs.map(|(a, b)| (*a - *b).length_squared());
         (squares.sum::<f32>() / a.pixels.len() as f32).sqrt()
     }
 

@@ -196,11 +196,8 @@ pub(super) fn follow(
                 let direction = ray.direction.normalize_or_zero();
                 let weight = bsdf_pdf.map_or(1.0, |pdf| {
                     let map_pdf = environment.pdf(ray.origin, direction);
-                    emission_weight(
-                        pdf,
-                        map_pdf * (1.0 - world.lit().emitter_fraction()),
-                        options,
-                    )
+                    let light_pdf = map_pdf * (1.0 - world.lit().emitter_fraction());
+                    emission_weight(pdf, light_pdf, options)
                 });
                 let light = throughput * environment.radiance(ray.origin, direction) * weight;
                 add(Origin::Outside, light);

@@ -49,13 +49,11 @@ pub fn upsample(
         let light = sum / weights.max(f32::MIN_POSITIVE);
         guide.map_or(light, |guide| guide.modulated(light))
     };
+    let pixels = (0..width as usize * height as usize).into_par_iter();
     Picture {
         width,
         height,
-        pixels: (0..width as usize * height as usize)
-            .into_par_iter()
-            .map(pixel)
-            .collect(),
+        pixels: pixels.map(pixel).collect(),
     }
 }
 

@@ -6,15 +6,13 @@ use crate::capture::truth::Truth;
 use crate::error::Result;
 use crate::math::picture::Picture;
 use crate::math::rng::splitmix64;
-use crate::room::generated::family::Family;
+use crate::room::generated::Family;
 use crate::room::generated::furnisher::Furnisher;
 use crate::room::model::Room;
 use crate::room::photographs::Rendering;
 use crate::room::truth;
-use crate::scene::geometry::Hit;
 use crate::transport::environment::Environment;
 use crate::transport::lit::LitScene;
-use glam::{Vec2, Vec3};
 use std::sync::Arc;
 
 /// Key of the photographs' random seed.
@@ -95,19 +93,5 @@ impl Generated {
     /// The true albedo of a frame, averaged over each pixel; black where no surface is visible.
     pub fn albedo(&self, frame: usize) -> Picture {
         truth::albedo_picture(&self.lit, &self.lit.scene.cameras[frame])
-    }
-
-    /// The true emission at the pixel centres of a frame; black where no surface is visible.
-    pub fn emission(&self, frame: usize) -> Picture {
-        let camera = &self.lit.scene.cameras[frame];
-        let emitted = |hit: &Hit| {
-            let object = self.lit.scene.object_of[hit.triangle as usize];
-            self.lit.materials[object as usize].emission
-        };
-        Picture::from_fn(camera.intrinsics.width, camera.intrinsics.height, |x, y| {
-            let center = Vec2::new(x as f32, y as f32) + 0.5;
-            let hit = self.lit.scene.intersect(&camera.ray(center));
-            hit.as_ref().map_or(Vec3::ZERO, emitted)
-        })
     }
 }

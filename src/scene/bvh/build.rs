@@ -186,10 +186,8 @@ impl<C: Fn(u32) -> [Vec3; 3] + Sync> Layout<'_, C> {
         tree.nodes.push(Node::empty());
         let children = self.children(root);
         let stacked = children.len() - 1;
-        let parts: Vec<Subtree> = children
-            .par_iter()
-            .map(|&child| self.subtree(child))
-            .collect();
+        let parts = children.par_iter().map(|&child| self.subtree(child));
+        let parts: Vec<Subtree> = parts.collect();
         for (lane, (child, part)) in children.into_iter().zip(parts).enumerate() {
             tree.stack = tree.stack.max(stacked + part.stack);
             let reference = tree.append(part);

@@ -12,8 +12,7 @@ mod binary;
 mod build;
 mod lanes;
 mod pages;
-mod shear;
-mod slabs;
+mod ray;
 mod split;
 mod traverse;
 
@@ -146,12 +145,8 @@ pub struct Bvh {
 
 impl std::fmt::Debug for Bvh {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(
-            f,
-            "Bvh({} triangles, {} nodes)",
-            self.triangles,
-            self.nodes.len()
-        )
+        let (triangles, nodes) = (self.triangles, self.nodes.len());
+        write!(f, "Bvh({triangles} triangles, {nodes} nodes)")
     }
 }
 

@@ -3,8 +3,7 @@
 #[cfg(target_arch = "x86_64")]
 use crate::scene::bvh::lanes::{Eight, Four};
 use crate::scene::bvh::lanes::{Lanes, Portable};
-use crate::scene::bvh::shear::Shear;
-use crate::scene::bvh::slabs::{Slabs, reciprocal};
+use crate::scene::bvh::ray::{Shear, Slabs, reciprocal};
 use crate::scene::bvh::{Bvh, Child, GROUP, Group, InstructionSet, Node, WIDTH, prefetch};
 use crate::scene::geometry::{Hit, Ray};
 use std::cell::RefCell;

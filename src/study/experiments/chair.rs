@@ -7,10 +7,7 @@ use crate::transport::material::Material;
 use glam::{DAffine3, DVec3, Vec3};
 use std::sync::Arc;
 
-/// The chair as an object of one colour, placed by `stand`.
-///
-/// # Errors
-/// A coordinate is not finite.
+/// The chair as an object of one colour, placed by `stand`; fails if a coordinate is not finite.
 pub fn chair_model(name: &str, stand: DAffine3, color: Vec3) -> Result<Arc<ObjectModel>> {
     let mut modeller = Modeller::default();
     modeller.object(name);

@@ -162,10 +162,7 @@ pub fn estimate(descent: &Descent) -> Estimate {
     }
 }
 
-/// Solves with the transport cache and measures its end.
-///
-/// # Errors
-/// The solver cannot start, or the study is stopped.
+/// Solves with the transport cache and measures its end; fails as [`solved`].
 pub fn cached(bench: &Bench, gauge: &Evaluator, settings: &Settings) -> Result<Mark> {
     let solution = solved(bench, gauge.subject, settings)?;
     Ok(Mark {
@@ -189,13 +186,8 @@ pub fn solved(bench: &Bench, subject: &Subject, settings: &Settings) -> Result<S
         weight: 1.0,
     };
     let deadline = Instant::now() + PATIENCE;
-    let (_, solution) = watch(
-        &subject.problem,
-        &subject.metric,
-        &run,
-        deadline,
-        bench.stopped,
-    )?;
+    let (problem, metric) = (&subject.problem, &subject.metric);
+    let (_, solution) = watch(problem, metric, &run, deadline, bench.stopped)?;
     bench.go_on()?;
     Ok(solution)
 }

@@ -89,10 +89,7 @@ pub fn words(spread: Option<Spread>) -> String {
     spread.map_or("-".to_owned(), |spread| spread.words())
 }
 
-/// Runs a course of each kind and seed in turn, and shows the plot so far after each.
-///
-/// # Errors
-/// The study is stopped.
+/// Runs a course of each kind and seed in turn, and shows the plot so far after each. Fails if the study is stopped.
 pub fn run(
     bench: &Bench,
     names: impl IntoIterator<Item = String>,

@@ -43,11 +43,8 @@ const ESTIMATORS: [(&str, Estimator); 4] = [
         l1(pixels, |p| p.render[1])
     }),
     ("l2, same samples", |pixels| {
-        ratio(
-            pixels,
-            |p| p.render[0] * p.photograph,
-            |p| p.render[0] * p.render[0],
-        )
+        let over = |p: &Pixel| p.render[0] * p.photograph;
+        ratio(pixels, over, |p| p.render[0] * p.render[0])
     }),
     ("l2, two sets", |pixels| {
         let both = |p: &Pixel| 0.5 * (p.render[0] + p.render[1]) * p.photograph;
@@ -238,11 +235,8 @@ fn l1(pixels: &[Pixel], weight: impl Fn(&Pixel) -> f64) -> f64 {
 /// Expected l2 fit with the same samples: Σ x² / Σ (x² + σ²), the variance σ² of a render from the difference of the two.
 fn same_samples_predicted(pixels: &[Pixel]) -> f64 {
     let noise = |p: &Pixel| 0.5 * (p.render[0] - p.render[1]).powi(2);
-    ratio(
-        pixels,
-        |p| p.photograph.powi(2),
-        |p| p.photograph.powi(2) + noise(p),
-    )
+    let square = |p: &Pixel| p.photograph.powi(2);
+    ratio(pixels, square, |p| square(p) + noise(p))
 }
 
 fn plot(name: &str, fits: &[Fits]) -> Plot {

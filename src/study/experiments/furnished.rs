@@ -60,9 +60,6 @@ pub struct Furnished {
 }
 
 /// The built-in room with two chairs; its textures are replaced by their means unless `textured`.
-///
-/// # Errors
-/// The program file is damaged.
 pub fn built_in(textured: bool, quick: bool) -> Result<Furnished> {
     let mut room = Room::new();
     if !textured {

@@ -159,10 +159,8 @@ pub struct Evenness {
 
 /// The noise at 1, 4, 16, … up to `max` paths, on `pixels` lit pixels spread evenly over all photographs.
 pub fn evenness(problem: &Problem, truth: &Unknowns, pixels: usize, max: u64) -> Vec<Evenness> {
-    let counts: Vec<u64> = (0..)
-        .map(|k| 4u64.pow(k))
-        .take_while(|&n| n <= max)
-        .collect();
+    let powers = (0..).map(|k| 4u64.pow(k));
+    let counts: Vec<u64> = powers.take_while(|&n| n <= max).collect();
     let all = pixels_of(problem);
     let squares: Vec<[Vec<f64>; 2]> = (0..pixels)
         .into_par_iter()
@@ -229,8 +227,6 @@ fn variances<U: Uniforms>(
         }
     }
     let level = means.last().map_or(0.0, |m| m.mean);
-    means
-        .iter()
-        .map(|m| m.variance() / (level * level))
-        .collect()
+    let relative = |m: &Moments| m.variance() / (level * level);
+    means.iter().map(relative).collect()
 }

@@ -108,10 +108,7 @@ fn run(bench: &Bench) -> Result<Findings> {
         plots: vec![("", plot(&scenes))],
         summary: summary(&scenes),
         seen: scenes.iter().flat_map(seen).collect(),
-        pictures: scenes
-            .into_iter()
-            .map(|scene| (scene.file, scene.grid))
-            .collect(),
+        pictures: scenes.into_iter().map(|s| (s.file, s.grid)).collect(),
     })
 }
 
@@ -145,12 +142,8 @@ fn scene(
     };
     for &frame in &room.frames {
         let camera = &scene.cameras[frame];
-        let backdrop = Backdrop::new(
-            frame,
-            camera,
-            &problem.photographs[frame],
-            Exposure::default(),
-        )?;
+        let photograph = &problem.photographs[frame];
+        let backdrop = Backdrop::new(frame, camera, photograph, Exposure::default())?;
         let composite = |lit: &Arc<LitScene>, options: PathOptions| {
             insert(lit, &backdrop, &objects, options, [1, 2], samples)
         };
@@ -180,14 +173,8 @@ fn scene(
 
         // The truth, and where it differs from the empty room.
         let mut film = Film::new(camera);
-        film.add(
-            &room.furnished,
-            camera,
-            &full,
-            TRUTH_SEED,
-            frame as u64,
-            truth_samples,
-        );
+        let (world, key) = (&room.furnished, frame as u64);
+        film.add(world, camera, &full, TRUTH_SEED, key, truth_samples);
         let truth = film.picture();
         let changes = layers.delta.pixels.iter().zip(&layers.without.pixels);
         let masks = [
@@ -269,12 +256,8 @@ fn plot(scenes: &[Scene]) -> Plot {
 
 fn summary(scenes: &[Scene]) -> Summary {
     let words = |l: &Likeness| {
-        format!(
-            "{} · {:.1} dB · {:.3}",
-            brief(l.relative()),
-            l.psnr(),
-            l.ssim()
-        )
+        let error = brief(l.relative());
+        format!("{error} · {:.1} dB · {:.3}", l.psnr(), l.ssim())
     };
     let rows = scenes.iter().flat_map(|scene| {
         (WAYS.iter().zip(&scene.likeness)).map(move |(way, [objects, shadow])| {

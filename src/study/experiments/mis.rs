@@ -157,14 +157,8 @@ fn run(bench: &Bench) -> Result<Findings> {
                 .collect::<Result<_>>()?,
         });
     }
-    let kinds: Vec<Kind> = scenes
-        .iter()
-        .flat_map(|scene| scene.kinds.clone())
-        .collect();
-    let cache: Vec<Mark> = scenes
-        .iter()
-        .flat_map(|scene| scene.cache.clone())
-        .collect();
+    let kinds: Vec<Kind> = scenes.iter().flat_map(|s| s.kinds.clone()).collect();
+    let cache: Vec<Mark> = scenes.iter().flat_map(|s| s.cache.clone()).collect();
     let mut plots = Vec::new();
     for scene in &scenes {
         let draw = |over| plot(&scene.name, over, LOSS, &scene.kinds, &scene.cache);

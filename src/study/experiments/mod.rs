@@ -16,7 +16,6 @@ mod gradient;
 mod insertion;
 mod likeness;
 mod mis;
-mod moved;
 mod objects;
 mod precision;
 pub mod readings;

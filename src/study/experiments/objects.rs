@@ -130,10 +130,7 @@ pub fn shadowed(quick: bool) -> Result<Posed> {
     })
 }
 
-/// The most visible object of a capture's twin that is no lamp. All other objects are unknown too.
-///
-/// # Errors
-/// All objects are lamps.
+/// The most visible object of a capture's twin that is no lamp; fails if all are. All other objects are unknown too.
 pub fn of_twin(twin: &Studied) -> Result<Posed> {
     let room = &twin.room;
     let seen = seen_pixels(&room.lit(twin.rendering.size)?);

@@ -62,6 +62,7 @@ pub fn mistakes() -> Vec<Mistake> {
         ..sound
     };
     let focal = |focal| Reading { focal, ..sound };
+    let axes = |axes| Reading { axes, ..sound };
     let lies = |orientation| Reading {
         orientation,
         ..sound
@@ -92,13 +93,7 @@ pub fn mistakes() -> Vec<Mistake> {
             name: "all photographs the same",
             reading: None,
         },
-        mistake(
-            "poses with OpenCV's axes",
-            Reading {
-                axes: Axes::OpenCv,
-                ..sound
-            },
-        ),
+        mistake("poses with OpenCV's axes", axes(Axes::OpenCv)),
         mistake(
             "mesh with z up, poses with y up",
             Reading {

@@ -170,15 +170,11 @@ mod tests {
         }
         for ((chance, weight), pixels) in counts.iter().zip(&groups.pixels) {
             // Five standard deviations of a binomial fraction of one in eight.
-            assert!(
-                (chance - 1.0 / objects as f64).abs() < 5.0 * 0.33 / 282.0,
-                "{chance}"
-            );
+            let off = (chance - 1.0 / objects as f64).abs();
+            assert!(off < 5.0 * 0.33 / 282.0, "{chance}");
             let fraction = pixels.len() as f64 / groups.total as f64;
-            assert!(
-                (weight / fraction - 1.0).abs() < 0.05,
-                "{weight} {fraction}"
-            );
+            let ratio = weight / fraction;
+            assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
         }
     }
 }

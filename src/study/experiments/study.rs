@@ -193,12 +193,8 @@ impl Grid {
     /// The file cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
         let pictures = self.pictures.iter().map(|(name, p)| (name.as_str(), p));
-        write_grid(
-            path,
-            &pictures.collect::<Vec<_>>(),
-            self.columns,
-            self.exposure,
-        )
+        let pictures: Vec<_> = pictures.collect();
+        write_grid(path, &pictures, self.columns, self.exposure)
     }
 }
 

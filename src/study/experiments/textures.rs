@@ -187,21 +187,16 @@ fn unknowns(estimate: &Estimate) -> usize {
         }
         count
     };
-    estimate
-        .texels
-        .as_ref()
-        .map_or(estimate.objects.len(), cells)
+    let texels = estimate.texels.as_ref();
+    texels.map_or(estimate.objects.len(), cells)
 }
 
 impl Measure {
     fn new(subject: &Subject, truth: Option<&LitScene>) -> Self {
         let scene = &subject.problem.scene;
         let pictures = |lit: &LitScene| {
-            scene
-                .cameras
-                .iter()
-                .map(|c| albedo_picture(lit, c))
-                .collect()
+            let cameras = scene.cameras.iter();
+            cameras.map(|camera| albedo_picture(lit, camera)).collect()
         };
         let counts = scene.ids().triangles.iter().map(|triangles| {
             let reflects = |&triangle: &u32| {
@@ -329,16 +324,12 @@ fn seen(states: &[State]) -> Vec<String> {
         (None, Some(loss)) => format!("a loss of {}", brief(loss)),
         (None, None) => "nothing measured".to_owned(),
     };
-    let course: Vec<String> = states
-        .iter()
-        .map(|s| format!("{} {}", s.name, score(s)))
-        .collect();
+    let words = |state: &State| format!("{} {}", state.name, score(state));
+    let course: Vec<String> = states.iter().map(words).collect();
     // Larger is better for both.
     let value = |state: &State| {
-        state
-            .psnr
-            .or(state.loss.map(|loss| -loss))
-            .unwrap_or(f64::NAN)
+        let value = state.psnr.or(state.loss.map(|loss| -loss));
+        value.unwrap_or(f64::NAN)
     };
     let mut seen = vec![format!("{}.", course.join("; "))];
     let [objects, textures, start, ..] = states else {

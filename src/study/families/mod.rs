@@ -4,17 +4,15 @@
 //! rooms.json and rooms.png summarize all rows of rooms.csv of one program version, preset and size.
 
 mod composite;
-mod plot;
 mod row;
 mod score;
 mod segments;
 mod summary;
 
 pub use composite::{CompositeRow, Decision, composite};
-pub use plot::plot;
 pub use row::{RoomRow, Row, Rows, SolveKey};
 pub use score::measure;
-pub use summary::{Quantiles, Summary, summarize};
+pub use summary::{Quantiles, Summary, plot, summarize};
 
 use crate::error::{Error, Result};
 use crate::inverse::settings::Preset;

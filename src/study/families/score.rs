@@ -147,10 +147,8 @@ fn claimed(
 ) -> Vec<(f64, f64)> {
     let scored = errors.iter().filter(|(_, errors)| errors.scored);
     let known = scored.filter_map(|(name, errors)| {
-        let place = scene
-            .objects
-            .iter()
-            .position(|object| object.name == *name)?;
+        let mut objects = scene.objects.iter();
+        let place = objects.position(|object| object.name == *name)?;
         let estimated = estimate.objects.get(place)?;
         Some((estimated, errors.albedo_true?)).filter(|_| estimated.albedo_identifiable)
     });

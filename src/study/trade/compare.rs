@@ -26,10 +26,8 @@ pub fn against_paper(curves: &[Curve]) -> Vec<String> {
     let is_paper = |curve: &&Curve| curve.settings.preset == Preset::Paper;
     let paper = || curves.iter().filter(is_paper);
     let presets = || curves.iter().filter(|c| c.is_preset && !is_paper(c));
-    let longest = paper()
-        .filter_map(|curve| curve.points.last())
-        .map(|point| point.seconds)
-        .fold(0.0, f64::max);
+    let ends = paper().filter_map(|curve| curve.points.last());
+    let longest = ends.map(|point| point.seconds).fold(0.0, f64::max);
     if longest == 0.0 {
         return Vec::new();
     }
