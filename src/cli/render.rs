@@ -9,7 +9,6 @@ use crate::export::exr::{Precision, write_rgb};
 use crate::export::light_layers;
 use crate::export::overwrite;
 use crate::export::picture::{shown_at, write_png};
-use crate::math::picture::Picture;
 use crate::render::{Device, Pictures, Renderer};
 use crate::say;
 use crate::scene::camera::Camera;
@@ -108,11 +107,7 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
     let mut pictures = Pictures::new(&renderer, &lit);
     let mut rendered = |seed, samples| {
         let film = pictures.film(&camera, &options, (seed, frame), samples);
-        Picture {
-            width: film.width,
-            height: film.height,
-            pixels: film.mean(),
-        }
+        film.picture()
     };
     let denoiser = arguments.denoise.denoiser(is_png)?;
     let mut picture = if let Some(denoiser) = denoiser {

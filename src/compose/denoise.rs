@@ -57,8 +57,7 @@ impl DenoisedLight {
     }
 }
 
-/// Pixels of which objects cover a fraction `alpha`, from the objects' radiance, that without them, and what they change beside
-/// them.
+/// Pixels of which objects cover a fraction `alpha`, from the objects' radiance, that without them, and their change beside them.
 pub(super) fn layered(
     alpha: &[f32],
     object: &Picture,

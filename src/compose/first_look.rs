@@ -42,8 +42,7 @@ pub fn first_look(insertion: &Insertion) -> Vec<LayeredPixel> {
     layered(&alpha, &object, &without, &change)
 }
 
-/// Gives the mean light of the objects to the pixels that see none: the render may have missed thin parts, which take it from
-/// there.
+/// Gives the mean light of the objects to the pixels that see none: thin parts that the render missed take it from there.
 fn lend_to_what_was_missed(object: &mut Picture, guides: &[Option<Guide>]) {
     let (mut light, mut count) = (Vec3::ZERO, 0.0);
     for (radiance, guide) in object.pixels.iter().zip(guides) {

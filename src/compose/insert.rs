@@ -1,8 +1,6 @@
-//! Differential rendering (Debevec 1998): changes the photograph by the ratio of renders with and without the objects, and covers
-//! it with the objects.
+//! Differential rendering (Debevec 1998): the photograph times the ratio of renders with and without the objects, covered by these.
 //!
-//! Both renders use the same random numbers. Paths that meet no object cancel to the bit, so the photograph is unchanged
-//! wherever the objects have no effect.
+//! Both use the same random numbers. Paths that meet no object cancel to the bit: the photograph stays where they have no effect.
 
 use crate::compose::backdrop::{Backdrop, LayeredPixel};
 use crate::compose::placement::PlacedObject;
@@ -109,8 +107,7 @@ impl Insertion {
         Self::new(backdrop, lit, objects, self.options, seed)
     }
 
-    /// Adds `samples` paths to every pixel, in parallel. The result is the same to the bit for any split into calls
-    /// and any number of threads.
+    /// Adds `samples` paths to every pixel, in parallel. The same to the bit for any split into calls and any number of threads.
     pub fn pass(&mut self, samples: u32) {
         self.refine_to(self.samples() + samples, || true);
     }
@@ -196,8 +193,7 @@ impl Insertion {
 
     /// The composite in the photograph's values.
     ///
-    /// Pixels that no object changes, not even within the reach of the blur, keep the photograph's value to the bit; without
-    /// objects, all do.
+    /// Pixels that no object changes, not even within the reach of the blur, keep the photograph's value to the bit.
     pub fn composite(&self) -> Picture {
         let pixels = (0..self.pixels.len()).into_par_iter();
         let layers: Vec<LayeredPixel> = pixels.map(|pixel| self.layered(pixel)).collect();

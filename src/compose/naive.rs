@@ -28,8 +28,7 @@ const PROBE_SIDE: usize = 64;
 /// Sub-pixels along a side, for coverage.
 const GRID: usize = 4;
 
-/// Spherical harmonics of the photographs, as if their light came from infinitely far away. Directions that no photograph shows
-/// get the mean of those that are shown.
+/// Spherical harmonics of the photographs, as if all light came from far away. Directions that none shows get the others' mean.
 pub fn harmonics_of_photographs<'a>(
     frames: impl IntoIterator<Item = (&'a Camera, &'a Picture)>,
 ) -> Harmonics {
@@ -54,10 +53,8 @@ pub fn harmonics_of_photographs<'a>(
             }
         }
     }
-    let means: Vec<Option<DVec3>> = cells
-        .iter()
-        .map(|(sum, n)| (*n > 0).then(|| *sum / f64::from(*n)))
-        .collect();
+    let mean = |(sum, n): &(DVec3, u32)| (*n > 0).then(|| *sum / f64::from(*n));
+    let means: Vec<Option<DVec3>> = cells.iter().map(mean).collect();
     let seen = means.iter().flatten().count().max(1) as f64;
     let mean = means.iter().flatten().sum::<DVec3>() / seen;
 

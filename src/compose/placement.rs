@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::gpu::Inserted;
 use crate::scene::Scene;
 use crate::scene::bvh::Bvh;
-use crate::scene::geometry::{Hit, Ray};
+use crate::scene::geometry::Ray;
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -17,8 +17,7 @@ use std::sync::Arc;
 pub struct Placement {
     /// OBJ or GLB file.
     pub file: PathBuf,
-    /// Position of the centre of the object's base in the capture's coordinates; `None` if the file's coordinates are the
-    /// capture's.
+    /// Centre of the object's base in the capture's coordinates; `None` if the file's coordinates are the capture's.
     pub at: Option<DVec3>,
     /// Factor on the file's size.
     pub scale: f64,
@@ -59,8 +58,7 @@ impl Placement {
         DQuat::from_rotation_x(self.tilt.x.to_radians()) * about_z
     }
 
-    /// The transform from the file's to the capture's coordinates; `base` is [`ObjectModel::base`] of the tilted model,
-    /// `up` the capture's unit up vector.
+    /// Transform from the file's to the capture's coordinates; `base` is the tilted [`ObjectModel::base`], `up` the unit up vector.
     ///
     /// With `at`, the tilted object's base is put there after the file's +y axis was rotated to `up` along the shortest
     /// arc. Without it, only `scale`, `tilt` and `rotate` apply, about the file's origin.
@@ -171,26 +169,4 @@ impl PlacedObject {
         let behind = to_center.dot(ray.direction) < 0.0 && to_center.length() > self.radius;
         distance <= self.radius + angle * to_center.length() && !behind
     }
-
-    /// The unit shading normal at a hit, on the front side.
-    pub fn shading_normal(&self, hit: &Hit) -> Vec3 {
-        let geometric = self.normals[hit.triangle as usize];
-        let own = self.corner_normals.get(hit.triangle as usize);
-        own.map_or(geometric, |n| interpolate(n, hit).normalize_or(geometric))
-    }
-
-    /// Diffuse reflectance at a hit, times the vertex colours.
-    pub fn albedo(&self, hit: &Hit) -> Vec3 {
-        let triangle = hit.triangle as usize;
-        let material = &self.model.materials[self.model.material_of[triangle] as usize];
-        let colors = self.model.corner_colors.get(triangle);
-        let tint = colors.map_or(Vec3::ONE, |colors| interpolate(colors, hit));
-        (material.albedo_at(hit) * tint).clamp(Vec3::ZERO, Vec3::ONE)
-    }
-}
-
-/// Barycentric interpolation of values at a triangle's corners.
-#[inline]
-pub fn interpolate(corners: &[Vec3; 3], hit: &Hit) -> Vec3 {
-    corners[0] * (1.0 - hit.b1 - hit.b2) + corners[1] * hit.b1 + corners[2] * hit.b2
 }

@@ -178,8 +178,7 @@ fn softness(
     if found < min { 0.0 } else { found.min(max) }
 }
 
-/// Standard deviation in pixels of a step edge's blur, beyond the pixel's box filter. `ratio`: slope before over
-/// after the known blur.
+/// Standard deviation in pixels of a step edge's blur, beyond the box filter. `ratio`: slope before over after the known blur.
 fn softness_of(ratio: f64) -> f64 {
     // Difference between the pixels after and before a step of height 1.
     let slope = |variance: f64| libm::erf((2.0 * (variance + PIXEL_VARIANCE)).sqrt().recip());

@@ -1,5 +1,4 @@
-//! Relights a photograph by the ratio of two renders of its view (Marschner and Greenberg 1997), which keeps detail that the
-//! estimate does not model.
+//! Relights a photograph by the ratio of two renders (Marschner and Greenberg 1997), which keeps detail beyond the estimate.
 
 use crate::compose::backdrop::Backdrop;
 use crate::error::Result;
@@ -171,25 +170,22 @@ impl Relighting {
 
     /// Renders in both lights at the photograph's size, denoised if there are two pairs.
     fn renders(&mut self) -> [Picture; 2] {
-        let mean = |film: &Film| Picture {
-            width: film.width,
-            height: film.height,
-            pixels: film.mean(),
-        };
         let size = |camera: &Camera| [camera.intrinsics.width, camera.intrinsics.height];
         let whole = &self.backdrop.camera;
         let is_small = size(&self.camera) != size(whole);
         if !is_small && self.denoiser.is_none() {
-            return self.pairs[0].each_ref().map(mean);
+            return self.pairs[0].each_ref().map(Film::picture);
         }
         let lights = self.lights.each_ref();
         let seen = || lights.map(|lit| guides(&**lit, &self.camera));
         let guides = self.guides.get_or_insert_with(seen);
         let render = |light: usize| match (&self.pairs[..], self.denoiser) {
-            ([first, second], Some(denoiser)) => {
-                denoiser.denoise(&mean(&first[light]), &mean(&second[light]), &guides[light])
-            }
-            (pairs, _) => mean(&pairs[0][light]),
+            ([first, second], Some(denoiser)) => denoiser.denoise(
+                &first[light].picture(),
+                &second[light].picture(),
+                &guides[light],
+            ),
+            (pairs, _) => pairs[0][light].picture(),
         };
         let renders = [0, 1].map(render);
         if !is_small {

@@ -1,10 +1,9 @@
 //! The scene with inserted objects, as the path tracer sees it.
 
-use crate::compose::placement::{PlacedObject, interpolate};
+use crate::compose::placement::PlacedObject;
 use crate::scene::geometry::{Hit, Ray};
-use crate::transport::environment::Environment;
 use crate::transport::lit::LitScene;
-use crate::transport::world::{EmitterSample, SurfacePoint, World, towards_viewer};
+use crate::transport::world::{SurfacePoint, World, towards_viewer};
 use glam::Vec3;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -63,14 +62,19 @@ impl<'a> FurnishedScene<'a> {
         let triangle = hit.triangle as usize;
         let corners = object.corners[triangle];
         let normal = object.normals[triangle];
-        let material = &object.model.materials[object.model.material_of[triangle] as usize];
+        let model = &object.model;
+        let material = &model.materials[model.material_of[triangle] as usize];
+        let own = object.corner_normals.get(triangle);
+        let shading = own.map_or(normal, |n| interpolate(n, hit).normalize_or(normal));
+        let colors = model.corner_colors.get(triangle);
+        let tint = colors.map_or(Vec3::ONE, |colors| interpolate(colors, hit));
         let back = -ray.direction.normalize_or_zero();
         SurfacePoint {
             point: interpolate(&corners, hit),
             corners,
             normal,
-            shading_normal: towards_viewer(object.shading_normal(hit), normal, back),
-            albedo: object.albedo(hit),
+            shading_normal: towards_viewer(shading, normal, back),
+            albedo: (material.albedo_at(hit) * tint).clamp(Vec3::ZERO, Vec3::ONE),
             emission: Vec3::ZERO,
             lobe: material.lobe,
             object: (self.lit.scene.objects.len() + index) as u32,
@@ -80,7 +84,17 @@ impl<'a> FurnishedScene<'a> {
     }
 }
 
+/// Barycentric interpolation of values at a triangle's corners.
+#[inline]
+fn interpolate(corners: &[Vec3; 3], hit: &Hit) -> Vec3 {
+    corners[0] * (1.0 - hit.b1 - hit.b2) + corners[1] * hit.b1 + corners[2] * hit.b2
+}
+
 impl World for FurnishedScene<'_> {
+    fn lit(&self) -> &LitScene {
+        self.lit
+    }
+
     fn intersect(&self, ray: &Ray) -> Option<SurfacePoint> {
         let scene_hit = self.lit.scene.intersect(ray);
         let t_max = scene_hit.map_or(ray.t_max, |hit| hit.t);
@@ -100,24 +114,5 @@ impl World for FurnishedScene<'_> {
             self.touched.store(true, Ordering::Relaxed);
         }
         occluded
-    }
-
-    fn sample_emitter(&self, choice: f64, u: [f32; 2]) -> Option<EmitterSample> {
-        self.lit.sample_emitter(choice, u)
-    }
-
-    fn emitter_pdf(&self, surface: &SurfacePoint) -> f32 {
-        if surface.object as usize >= self.lit.scene.objects.len() {
-            return 0.0;
-        }
-        self.lit.emitter_pdf(surface)
-    }
-
-    fn has_emitters(&self) -> bool {
-        self.lit.has_emitters()
-    }
-
-    fn environment(&self) -> Option<&Environment> {
-        self.lit.environment()
     }
 }

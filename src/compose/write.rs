@@ -29,7 +29,6 @@ pub fn write_insertion(
     let exposure = backdrop.shown_at;
     let mut written = Vec::new();
 
-    // The two results.
     for (name, picture) in [("composite", composite), ("naive", naive)] {
         let exr = file(&format!(".{name}.exr"));
         write_rgb(&exr, picture, Precision::Float)?;
@@ -38,7 +37,6 @@ pub fn write_insertion(
         written.extend([exr, png]);
     }
 
-    // What they are made from.
     let delta = file(".delta.exr");
     write_rgb(&delta, &layers.delta, Precision::Float)?;
     let all = file(".layers.exr");
@@ -58,7 +56,6 @@ pub fn write_insertion(
         ],
     )?;
 
-    // All beside the photograph.
     let compare = file(".compare.png");
     write_row(
         &compare,

@@ -18,8 +18,7 @@ const MAX_SIDE: u32 = 8192;
 pub struct Atlas {
     /// Linear albedo.
     pub picture: Picture,
-    /// For each triangle of the scene, the texture coordinates of its corners as in glTF (v down, both from 0 to 1);
-    /// `None` for triangles of objects without texture.
+    /// For each triangle, the texture coordinates of its corners as in glTF (v down, both from 0 to 1); `None` without texture.
     pub corners: Vec<Option<[Vec2; 3]>>,
 }
 
@@ -104,8 +103,7 @@ fn onto_triangle(b1: f32, b2: f32) -> (f32, f32) {
     (b1, b2.min(1.0 - b1))
 }
 
-/// Packs squares, sorted by decreasing size, into rows of a nearly square picture. `None` if it exceeds [`MAX_SIDE`], unless
-/// `any_size`.
+/// Packs squares of decreasing size into rows of a nearly square picture. `None` if it exceeds [`MAX_SIDE`], unless `any_size`.
 fn pack(
     triangles: &[u32],
     side: impl Fn(u32) -> u32,

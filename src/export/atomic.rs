@@ -12,8 +12,7 @@ pub type WriteError = Box<dyn std::error::Error + Send + Sync>;
 
 /// Writes a file through `write`. `path` then holds either the complete new content or what it held before.
 ///
-/// Writes to a temporary file in the same folder, flushes it to disk and renames it. Creates missing folders. The file gets the
-/// default permissions of new files.
+/// Writes a temporary file in the same folder, flushes and renames it. Creates missing folders. Permissions are those of new files.
 ///
 /// # Errors
 /// The file is a capture's or of results (see [`overwrite`]), the folder or file cannot be written, the disk is full, or

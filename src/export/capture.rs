@@ -14,8 +14,7 @@ use serde_json::{Value, json};
 use std::io::Write;
 use std::path::Path;
 
-/// Writes a capture. Photographs become linear EXR files of radiance. transforms.json is written last, so that a
-/// folder that has it is complete.
+/// Writes a capture. Photographs become linear EXR files of radiance. A folder that has transforms.json is complete.
 ///
 /// # Errors
 /// A photograph cannot be read or a file cannot be written.

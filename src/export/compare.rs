@@ -1,9 +1,11 @@
 //! Pictures side by side, each with a caption.
 
 use crate::error::{Error, Result};
-use crate::export::canvas::Canvas;
-use crate::export::picture::to_srgb_bytes;
+use crate::export::canvas::draw_text;
+use crate::export::picture::{to_srgb_bytes, write_image};
 use crate::math::picture::Picture;
+use image::imageops::replace;
+use image::{Rgb, RgbImage};
 use std::path::Path;
 
 /// Height of the caption above each picture, in pixels.
@@ -38,15 +40,18 @@ pub fn write_grid(
     let columns = columns.clamp(1, pictures.len().max(1));
     let rows = pictures.len().div_ceil(columns);
     let width = (columns as u32 * (cell_width + GAP)).saturating_sub(GAP);
-    let mut canvas = Canvas::new(width, rows as u32 * cell_height, [255; 3]);
+    let mut all = RgbImage::from_pixel(width, rows as u32 * cell_height, Rgb([255; 3]));
     for (index, (caption, picture)) in pictures.iter().enumerate() {
         let x = (index % columns) as u32 * (cell_width + GAP);
         let y = (index / columns) as u32 * cell_height;
-        canvas.text(caption, x + picture.width / 2, y + CAPTION / 2, 15, [30; 3]);
+        let middle = x + picture.width / 2;
+        draw_text(&mut all, caption, middle, y + CAPTION / 2, 15, 30);
         let bytes = to_srgb_bytes(picture, exposure);
-        canvas.paste(&bytes, picture.width, x, y + CAPTION);
+        if let Some(image) = RgbImage::from_raw(picture.width, picture.height, bytes) {
+            replace(&mut all, &image, x.into(), (y + CAPTION).into());
+        }
     }
-    canvas.write(path)
+    write_image(path, &all)
 }
 
 #[cfg(test)]

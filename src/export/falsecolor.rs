@@ -1,12 +1,14 @@
 //! False-colour pictures of scalar values, with a legend.
 
 use crate::error::Result;
-use crate::export::canvas::Canvas;
-use crate::export::picture::percentile_exposure;
+use crate::export::canvas::draw_text;
+use crate::export::picture::{percentile_exposure, write_image};
 use crate::export::scale::Scale;
 use crate::math::color::luminance;
 use crate::math::picture::Picture;
 use glam::Vec3;
+use image::imageops::replace;
+use image::{Rgb, RgbImage};
 use plotters::coord::ranged1d::ValueFormatter;
 use std::path::Path;
 
@@ -92,9 +94,10 @@ fn write(
     let high = percentile_exposure(&magnitudes).recip();
     let low = low * high;
     let (width, height) = (picture.width, picture.height);
-    let mut canvas = Canvas::new(width, height + LEGEND, [255; 3]);
-    let bytes: Vec<u8> = values.iter().flat_map(|&v| color_of(v / high)).collect();
-    canvas.paste(&bytes, width, 0, 0);
+    let mut image = RgbImage::from_pixel(width, height + LEGEND, Rgb([255; 3]));
+    for (pixel, value) in image.pixels_mut().zip(&values) {
+        pixel.0 = color_of(value / high);
+    }
 
     // A colour bar, with the values of its ends and middle below.
     let margin = width / 8;
@@ -102,7 +105,9 @@ fn write(
     for x in 0..bar {
         let fraction = x as f32 / bar as f32;
         let color = color_of((low + (high - low) * fraction) / high);
-        canvas.fill(margin + x, height + 5, 1, 10, color);
+        let column = RgbImage::from_pixel(1, 10, Rgb(color));
+        let (x, y) = (margin + x, height + 5);
+        replace(&mut image, &column, x.into(), y.into());
     }
     let middle = (low + high) * 0.5;
     let labels = [
@@ -111,9 +116,9 @@ fn write(
         (width - margin, three_digits(high)),
     ];
     for (x, label) in labels {
-        canvas.text(&label, x, height + 24, 12, [40; 3]);
+        draw_text(&mut image, &label, x, height + 24, 12, 40);
     }
-    canvas.write(path)
+    write_image(path, &image)
 }
 
 #[cfg(test)]

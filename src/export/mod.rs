@@ -13,7 +13,6 @@ pub mod light_layers;
 pub mod mitsuba;
 pub mod new_folder;
 pub mod obj;
-pub mod objects;
 pub mod overwrite;
 pub mod part;
 pub mod picture;

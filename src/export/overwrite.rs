@@ -91,8 +91,7 @@ pub struct CaptureId {
     pub folder: Option<PathBuf>,
 }
 
-/// Refuses a folder for the results of `capture` if it holds results of another capture, or files of the same names that belong
-/// to no results.
+/// Refuses a folder for the results of `capture` if it holds results of another capture, or files of the same names of no results.
 ///
 /// # Errors
 /// The folder is refused.

@@ -7,7 +7,7 @@ use glam::{DVec3, Vec2, Vec3};
 use std::collections::HashMap;
 
 /// One object with its own vertices, in the capture's coordinates.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Part {
     /// The object's name.
     pub name: String,
@@ -51,10 +51,7 @@ fn cut(
         let mut part = Part {
             name: object.name.clone(),
             estimate: estimate.objects.get(index).cloned().unwrap_or_default(),
-            positions: Vec::new(),
-            triangles: Vec::new(),
-            colors: Vec::new(),
-            uvs: Vec::new(),
+            ..Part::default()
         };
         match estimate.texels.as_deref() {
             Some(texels) if texels.textured.get(index) == Some(&true) => {

@@ -5,7 +5,7 @@ use crate::export::atomic::write_atomically;
 use crate::math::color::to_srgb8;
 use crate::math::picture::Picture;
 use image::codecs::png::PngEncoder;
-use image::{ExtendedColorType, ImageEncoder};
+use image::{ExtendedColorType, ImageEncoder, RgbImage};
 use std::path::Path;
 
 /// The exposure that maps the 99th percentile of the finite channel values to 1.
@@ -62,11 +62,16 @@ pub fn png_bytes(picture: &Picture, exposure: f32) -> image::ImageResult<Vec<u8>
     Ok(encoded)
 }
 
-/// Writes 8-bit sRGB bytes (three a pixel, row by row) as a PNG.
+/// Writes an 8-bit sRGB picture as a PNG.
 ///
 /// # Errors
-/// The file cannot be written, or the number of bytes does not match the size.
-pub fn write_png_bytes(path: &Path, width: u32, height: u32, bytes: &[u8]) -> Result<()> {
+/// The file cannot be written, or the picture has no pixels.
+pub fn write_image(path: &Path, image: &RgbImage) -> Result<()> {
+    write_png_bytes(path, image.width(), image.height(), image)
+}
+
+/// Writes 8-bit sRGB bytes (three a pixel, row by row) as a PNG, if their number matches the size.
+fn write_png_bytes(path: &Path, width: u32, height: u32, bytes: &[u8]) -> Result<()> {
     let expected = u64::from(width) * u64::from(height) * 3;
     if expected == 0 || bytes.len() as u64 != expected {
         let problem = format!("{} bytes for {width} × {height} pixels", bytes.len());

@@ -110,7 +110,6 @@ impl Plot {
         let y_scale = Scale::around(ys.filter(|&v| self.y.shows(v)), self.y.logarithmic);
         let (bottom, top) = (y_scale.low(), y_scale.high());
 
-        // Axes.
         let mut chart = ChartBuilder::on(area)
             .caption(&self.title, (FONT, 24))
             .margin(14)
@@ -240,8 +239,7 @@ fn steps(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     points.first().copied().into_iter().chain(turns).collect()
 }
 
-/// Loss of a solve over seconds, in the fit and on held-out pixels, and the relative residual of the fit after each
-/// iteration, with the stages marked.
+/// Loss of a solve over seconds, in the fit and on held-out pixels, and the fit's relative residual, with the stages marked.
 pub fn loss_plot(losses: &[LossPoint], fits: &[FitPoint], stages: &[Stage]) -> Plot {
     let curve = |name: &str, value: fn(&LossPoint) -> Option<f64>| {
         let points = losses.iter();
@@ -252,13 +250,11 @@ pub fn loss_plot(losses: &[LossPoint], fits: &[FitPoint], stages: &[Stage]) -> P
         start += stage.seconds;
         (start - stage.seconds, stage.name.clone())
     };
+    let residuals = fits.iter().map(|p| [p.seconds, p.residual]);
     let series = [
         curve("in the fit", |p| p.train),
         curve("held out", |p| p.held_out),
-        Series::line(
-            "residual, relative",
-            fits.iter().map(|p| [p.seconds, p.residual]),
-        ),
+        Series::line("residual, relative", residuals),
     ];
     Plot {
         title: "Loss".to_owned(),

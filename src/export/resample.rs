@@ -3,14 +3,14 @@
 use crate::capture::import::Lens;
 use crate::capture::photograph::{Encoding, Photograph};
 use crate::error::{Error, Result};
-use crate::export::atomic::write_bytes;
+use crate::export::atomic::write_atomically;
 use crate::export::exr::{Layer, Precision, write_layers};
 use crate::math::color::linear_to_srgb;
 use exr::prelude::FlatSamples;
 use glam::{DVec2, Vec3};
-use image::{ImageBuffer, ImageFormat, Luma, Rgba};
+use image::codecs::png::PngEncoder;
+use image::{ImageBuffer, Luma, Rgba};
 use rayon::prelude::*;
-use std::io::Cursor;
 use std::path::Path;
 
 /// Position in the lens's image of the pinhole's pixel centre (i, j); `None` where the lens is not defined.
@@ -74,8 +74,7 @@ pub fn depth(values: &[u16], lens: &Lens) -> Vec<u16> {
         .collect()
 }
 
-/// Writes a photograph with its unusable pixels transparent: `NAME.exr` for linear values, else `NAME.png` with 16 bits a
-/// channel. Returns the extension.
+/// Writes a photograph, unusable pixels transparent: `NAME.exr` for linear values, else a 16-bit `NAME.png`. Returns the extension.
 ///
 /// # Errors
 /// The file cannot be written.
@@ -97,7 +96,9 @@ pub fn write_photograph(stem: &Path, photograph: &Photograph) -> Result<&'static
         let [r, g, b] = photograph.pixels[i].to_array().map(code);
         Rgba([r, g, b, u16::MAX * u16::from(photograph.is_usable(i))])
     });
-    write_png(&path, |bytes| image.write_to(bytes, ImageFormat::Png))?;
+    write_atomically(&path, |out| {
+        Ok(image.write_with_encoder(PngEncoder::new(out))?)
+    })?;
     Ok("png")
 }
 
@@ -109,14 +110,7 @@ pub fn write_depth(path: &Path, size: [u32; 2], values: Vec<u16>) -> Result<()> 
     let image: ImageBuffer<Luma<u16>, Vec<u16>> =
         ImageBuffer::from_raw(size[0], size[1], values)
             .ok_or_else(|| Error::file(path, "has not one depth a pixel", ""))?;
-    write_png(path, |bytes| image.write_to(bytes, ImageFormat::Png))
-}
-
-fn write_png(
-    path: &Path,
-    encode: impl FnOnce(&mut Cursor<Vec<u8>>) -> image::ImageResult<()>,
-) -> Result<()> {
-    let mut bytes = Cursor::new(Vec::new());
-    encode(&mut bytes).map_err(|e| Error::file(path, e, "nothing was written there"))?;
-    write_bytes(path, bytes.get_ref())
+    write_atomically(path, |out| {
+        Ok(image.write_with_encoder(PngEncoder::new(out))?)
+    })
 }

@@ -33,13 +33,8 @@ impl Table {
 
     /// Appends a row.
     pub fn row(&mut self, cells: &[Cell]) {
-        self.text.push_str(&Self::line(cells));
-    }
-
-    /// A row as text, with its newline.
-    pub fn line(cells: &[Cell]) -> String {
         let fields: Vec<String> = cells.iter().map(Cell::field).collect();
-        fields.join(",") + "\n"
+        self.text += &(fields.join(",") + "\n");
     }
 
     /// The table as text.

@@ -48,8 +48,7 @@ impl Card {
 
     fn of(adapter: &wgpu::Adapter) -> Option<Self> {
         let granted = adapter.limits();
-        // Limits that WebGPU guarantees, plus the adapter's full buffer sizes. Devices below the standard ("downlevel") need eight
-        // storage buffers in addition.
+        // Limits that WebGPU guarantees, plus the adapter's full buffer sizes. "Downlevel" defaults lack the eight storage buffers.
         let limits = wgpu::Limits {
             max_storage_buffers_per_shader_stage: 8,
             max_storage_buffer_binding_size: granted.max_storage_buffer_binding_size,
@@ -139,7 +138,6 @@ impl Card {
         Ok(made)
     }
 
-    /// An error of this card.
     pub(super) fn failed(&self, problem: String) -> Error {
         Error::new(&self.name, problem, "")
     }
@@ -169,7 +167,6 @@ fn rank(info: &wgpu::AdapterInfo, adapters: Adapters) -> Option<u8> {
     }
 }
 
-/// A driver's message on one line.
 fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }

@@ -1,4 +1,4 @@
-//! Definitions shared by processor and shader: structs with one layout, bindings and constants.
+//! The shader's source, and what it shares with the processor: structs with one layout, bindings and constants.
 
 use bytemuck::{Pod, Zeroable};
 use std::fmt::Write;
@@ -9,11 +9,9 @@ pub(super) const WORKGROUP: u32 = 64;
 pub(super) const NONE: u32 = u32::MAX;
 /// Four-component words per triangle: three corners and the normal.
 pub(super) const TRIANGLE_WORDS: usize = 4;
-/// Kind of albedo: a constant colour.
+/// Kinds of albedo: a constant colour, one colour per texel, and an image times a constant.
 pub(super) const ALBEDO_CONSTANT: u32 = 0;
-/// Kind of albedo: one colour per texel.
 pub(super) const ALBEDO_TEXELS: u32 = 1;
-/// Kind of albedo: an image times a constant.
 pub(super) const ALBEDO_IMAGE: u32 = 2;
 
 /// A type with the same bytes in Rust and WGSL: 16 of them, so that fields of such types lie at WGSL's offsets.
@@ -57,13 +55,9 @@ macro_rules! shared {
 shared! {
     /// Parameters of a dispatch.
     struct Dispatch {
-        /// The camera's centre.
         center: [f32; 4],
-        /// The camera's axis to the right.
         axis_x: [f32; 4],
-        /// The camera's axis upwards.
         axis_y: [f32; 4],
-        /// The camera's axis backwards.
         axis_z: [f32; 4],
         /// Focal lengths and principal point in pixels.
         lens: [f32; 4],
@@ -81,7 +75,6 @@ shared! {
         emitter_fraction: [f32; 4],
     }
 
-    /// A material.
     struct Material {
         /// Constant albedo, or factor on the image.
         albedo: [f32; 4],
@@ -97,7 +90,6 @@ shared! {
         corners: [u32; 4],
     }
 
-    /// The sums of one pixel.
     struct Pixel {
         /// Sum of radiance, and number of samples whose first hit is an inserted object.
         over: [f32; 4],
@@ -113,7 +105,7 @@ shared! {
 }
 
 /// The head of the shader: constants, structs and bindings. `stack_size` entries bound the hierarchy's depth.
-pub(super) fn head(stack_size: u32) -> String {
+fn head(stack_size: u32) -> String {
     use crate::scene::geometry::OFFSET_GAMMA;
     use crate::transport::bsdf::{COUPLING_SLOPE, coupling_scale};
     use crate::transport::path::RR_MAX_SURVIVAL;
@@ -174,3 +166,56 @@ pub(super) const BINDINGS: [(&str, &str); 8] = [
     ("rays", "vec4<f32>"),
     (FILM, "Pixel"),
 ];
+
+/// The modules; their order does not matter.
+const MODULES: [&str; 11] = [
+    include_str!("shaders/random.wgsl"),
+    include_str!("shaders/hierarchy.wgsl"),
+    include_str!("shaders/texels.wgsl"),
+    include_str!("shaders/surface.wgsl"),
+    include_str!("shaders/microfacet.wgsl"),
+    include_str!("shaders/bsdf.wgsl"),
+    include_str!("shaders/emitters.wgsl"),
+    include_str!("shaders/environment.wgsl"),
+    include_str!("shaders/path.wgsl"),
+    include_str!("shaders/film.wgsl"),
+    include_str!("shaders/queries.wgsl"),
+];
+
+/// The entry point that accumulates radiance of a pixel.
+pub(super) const RENDER: &str = "render";
+/// The entry point that accumulates radiance of a pixel with and without inserted objects.
+pub(super) const INSERT: &str = "insert";
+/// The entry point that intersects a ray.
+pub(super) const TRACE: &str = "trace";
+
+/// The source for traversals with a stack of `stack_size` entries.
+pub(super) fn source(stack_size: u32) -> String {
+    let mut text = head(stack_size);
+    for module in MODULES {
+        text += "\n";
+        text += module;
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wgpu::naga::front::wgsl::parse_str;
+    use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
+
+    #[test]
+    fn the_shader_is_valid_without_an_adapter() {
+        let text = source(32);
+        let parsed = parse_str(&text).map_err(|error| error.emit_to_string(&text));
+        let module = parsed.unwrap_or_else(|error| panic!("{error}"));
+        let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
+        let valid = validator.validate(&module);
+        assert!(valid.is_ok(), "{valid:?}");
+        for kernel in [RENDER, INSERT, TRACE] {
+            let mut entries = module.entry_points.iter();
+            assert!(entries.any(|entry| entry.name == kernel));
+        }
+    }
+}

@@ -9,42 +9,29 @@ const CHOICE_BITS: i32 = 53;
 /// Bits of the random number that selects a triangle.
 const TRIANGLE_BITS: i32 = 48;
 
-/// Objects with positive probability, then their triangles: (low word, high word, first entry or slot, number of entries).
-#[derive(Debug, Default)]
-pub(super) struct Emitters {
-    /// The entries.
-    pub entries: Vec<[u32; 4]>,
-    /// Number of objects among them.
-    pub objects: u32,
-}
-
-impl Emitters {
-    /// The emitters of a scene; `slot_of` is the slot of each triangle ([`NONE`] for triangles that cannot be hit).
-    pub fn new(lit: &LitScene, slot_of: &[u32]) -> Self {
-        let probability = |object: usize| lit.emitters.probability(object);
-        let drawn: Vec<usize> = (0..lit.scene.objects.len())
-            .filter(|&object| probability(object) > 0.0 && lit.emitters.pdf(object as u32) > 0.0)
-            .collect();
-        let probabilities: Vec<f64> = drawn.iter().map(|&object| probability(object)).collect();
-        let chosen = thresholds(&probabilities, CHOICE_BITS);
-        let mut entries = vec![[0; 4]; drawn.len()];
-        for (index, (&object, threshold)) in drawn.iter().zip(chosen).enumerate() {
-            let first = entries.len() as u32;
-            let all = lit.scene.objects[object].triangles.iter().copied();
-            let triangles: Vec<u32> = all.filter(|&t| slot_of[t as usize] != NONE).collect();
-            let area = |&t: &u32| f64::from(lit.scene.areas[t as usize]);
-            let areas: Vec<f64> = triangles.iter().map(area).collect();
-            let drawn = thresholds(&areas, TRIANGLE_BITS);
-            for (threshold, &t) in drawn.into_iter().zip(&triangles) {
-                entries.push(entry(threshold, slot_of[t as usize], 0));
-            }
-            entries[index] = entry(threshold, first, triangles.len() as u32);
+/// Objects with positive probability, then their triangles: (low word, high word, first entry or slot, number of entries); and the
+/// number of objects. `slot_of` is the slot of each triangle ([`NONE`] for triangles that cannot be hit).
+pub(super) fn emitters(lit: &LitScene, slot_of: &[u32]) -> (Vec<[u32; 4]>, u32) {
+    let probability = |object: usize| lit.emitters.probability(object);
+    let drawn: Vec<usize> = (0..lit.scene.objects.len())
+        .filter(|&object| probability(object) > 0.0 && lit.emitters.pdf(object as u32) > 0.0)
+        .collect();
+    let probabilities: Vec<f64> = drawn.iter().map(|&object| probability(object)).collect();
+    let chosen = thresholds(&probabilities, CHOICE_BITS);
+    let mut entries = vec![[0; 4]; drawn.len()];
+    for (index, (&object, threshold)) in drawn.iter().zip(chosen).enumerate() {
+        let first = entries.len() as u32;
+        let all = lit.scene.objects[object].triangles.iter().copied();
+        let triangles: Vec<u32> = all.filter(|&t| slot_of[t as usize] != NONE).collect();
+        let area = |&t: &u32| f64::from(lit.scene.areas[t as usize]);
+        let areas: Vec<f64> = triangles.iter().map(area).collect();
+        let drawn = thresholds(&areas, TRIANGLE_BITS);
+        for (threshold, &t) in drawn.into_iter().zip(&triangles) {
+            entries.push(entry(threshold, slot_of[t as usize], 0));
         }
-        Self {
-            entries,
-            objects: drawn.len() as u32,
-        }
+        entries[index] = entry(threshold, first, triangles.len() as u32);
     }
+    (entries, drawn.len() as u32)
 }
 
 /// The environment: radiance and pdf per pixel, cumulative probability per pixel, cosines of the edges per row.

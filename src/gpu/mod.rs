@@ -2,10 +2,9 @@
 //!
 //! ```text
 //! card       adapters, the device, its errors
-//! layout     structs and constants shared with the shader
+//! layout     the shader's source, and the structs and constants that it shares
 //! shaders/   the path tracer, in modules named as in `transport`
-//! hierarchy  the binary hierarchy as buffers
-//! scene      triangles, materials and lights in the shader's layout
+//! scene      hierarchy, triangles, materials and lights in the shader's layout
 //! tracer     a scene on the card: pictures, pairs of pictures, single rays
 //! pace       the amount of work per dispatch
 //! ```
@@ -15,13 +14,11 @@
 //! device, is an error value, after which callers continue on the processor.
 
 mod card;
-mod hierarchy;
 mod layout;
 mod lights;
 mod materials;
 mod pace;
 mod scene;
-mod shader;
 mod tracer;
 
 pub use card::{Adapters, Card};

@@ -2,11 +2,12 @@
 
 use crate::error::Result;
 use crate::gpu::card::Card;
-use crate::gpu::layout::{BINDINGS, Dispatch, FILM, Material, NONE, Pixel, WORKGROUP};
+use crate::gpu::layout::{
+    BINDINGS, Dispatch, FILM, INSERT, Material, NONE, Pixel, RENDER, TRACE, WORKGROUP, source,
+};
 use crate::gpu::materials::Inserted;
 use crate::gpu::pace::Pace;
 use crate::gpu::scene::Packed;
-use crate::gpu::shader::{INSERT, RENDER, TRACE, source};
 use crate::math::rng::splitmix64;
 use crate::scene::camera::Camera;
 use crate::scene::geometry::{Hit, Ray};
@@ -188,8 +189,7 @@ impl Tracer {
         Ok(sums)
     }
 
-    /// The nearest hit of each ray, or any hit if `any`. Triangles of inserted objects count after the scene's; `t_min` is taken as
-    /// 0.
+    /// The nearest hit of each ray, or any hit if `any`. Triangles of inserted objects count after the scene's; `t_min` is ignored.
     ///
     /// # Errors
     /// The rays do not fit, or the card failed.

@@ -37,7 +37,7 @@ impl View {
 }
 
 /// Eye and target of the views of the built-in room.
-const VIEWS: [[[f64; 3]; 2]; 16] = [
+pub const VIEWS: [[[f64; 3]; 2]; 16] = [
     // The four corners, across the room.
     [[1.95, 1.55, 1.75], [-0.6, 0.75, -0.9]],
     [[-2.1, 1.60, 1.05], [0.9, 0.75, -0.9]],
@@ -59,11 +59,6 @@ const VIEWS: [[[f64; 3]; 2]; 16] = [
     [[-0.4, 1.1, -0.7], [-1.9, 0.75, 1.5]],
     [[-0.6, 0.85, 1.5], [1.5, 0.5, 0.2]],
 ];
-
-/// The views of the built-in room.
-pub fn built_in() -> Vec<View> {
-    View::all(&VIEWS)
-}
 
 /// Intrinsics and poses of the views at a size in pixels: square pixels, no distortion, principal point in the middle.
 pub fn cameras(views: &[View], size: [u32; 2]) -> Vec<(Intrinsics, Pose)> {

@@ -12,18 +12,59 @@ pub mod photographs;
 pub mod shape;
 mod texture;
 pub mod truth;
-mod write;
 
 pub use model::{Room, linear_photograph};
-pub use write::write;
 
 use crate::capture::Capture;
 use crate::error::Result;
+use crate::export::capture as folder;
+use crate::export::new_folder::NewFolder;
+use crate::math::picture::Picture;
+use crate::scene::camera::Camera;
+use photographs::{Rendering, STORED};
+use std::path::Path;
 
 /// The built-in room as a capture, ready to solve.
 ///
 /// # Errors
 /// The program file is damaged.
 pub fn capture() -> Result<Capture> {
-    Ok(Room::new().capture_of(photographs::stored()?, photographs::STORED.size))
+    Ok(Room::new().capture_of(photographs::stored()?, STORED.size))
+}
+
+/// Writes the room into a new or empty folder, atomically: transforms.json, mesh.obj, images, truth.json and
+/// truth/albedo_NNN.exr.
+///
+/// The photographs are the stored ones, byte for byte, or newly rendered.
+///
+/// # Errors
+/// The folder is not empty (see [`NewFolder`]), or a file cannot be written.
+pub fn write(out: &Path, rendering: Option<&Rendering>) -> Result<()> {
+    let new = NewFolder::new(out)?;
+    let out = new.path();
+    let room = Room::new();
+    let rendering_used = rendering.unwrap_or(&STORED);
+    let images = out.join("images");
+    match rendering {
+        Some(rendering) => photographs::write(&images, &photographs::render(&room, rendering)?)?,
+        None => photographs::write_stored(&images)?,
+    }
+    folder::write_mesh(out, &room.mesh)?;
+
+    let world = room.lit(rendering_used.size)?;
+    let seen_by = |camera: &Camera| truth::albedo_picture(&world, camera);
+    let albedo: Vec<Picture> = world.scene.cameras.iter().map(seen_by).collect();
+    let truth = truth::Truth {
+        name: "room",
+        renderer: format!("relit {}", env!("CARGO_PKG_VERSION")),
+        max_bounces: None,
+        spp: rendering_used.samples,
+        seed: rendering_used.seed,
+        outside_light: None,
+        objects: truth::objects(&world),
+    };
+    folder::write_truth(out, &truth, &albedo)?;
+    let cameras = cameras::cameras(&room.views, rendering_used.size);
+    folder::write_transforms(out, cameras.into_iter(), world.scene.up.as_dvec3())?;
+    new.commit()
 }

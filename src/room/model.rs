@@ -35,7 +35,7 @@ impl Room {
             name: "built-in room".to_owned(),
             mesh,
             materials,
-            views: cameras::built_in(),
+            views: View::all(&cameras::VIEWS),
         }
     }
 

@@ -15,11 +15,7 @@ use image::ImageFormat;
 use std::path::Path;
 
 /// The rendering that is stored in the program.
-pub const STORED: Rendering = Rendering {
-    seed: 7,
-    samples: 256,
-    size: [640, 480],
-};
+pub const STORED: Rendering = Rendering::new(7, 256, [640, 480]);
 
 macro_rules! stored {
     ($($number:literal)*) => {
@@ -49,6 +45,17 @@ pub struct Rendering {
     pub samples: u32,
     /// Width and height in pixels.
     pub size: [u32; 2],
+}
+
+impl Rendering {
+    /// Settings of a seed, a number of samples and a size.
+    pub const fn new(seed: u64, samples: u32, size: [u32; 2]) -> Self {
+        Self {
+            seed,
+            samples,
+            size,
+        }
+    }
 }
 
 impl Room {

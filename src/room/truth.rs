@@ -60,23 +60,18 @@ pub struct ObjectTruth {
     pub area: f64,
 }
 
-impl From<ObjectTruth> for crate::capture::truth::ObjectTruth {
-    fn from(truth: ObjectTruth) -> Self {
+impl From<BTreeMap<String, ObjectTruth>> for crate::capture::truth::Truth {
+    fn from(objects: BTreeMap<String, ObjectTruth>) -> Self {
         let wide = |color: [f32; 3]| Vec3::from(color).as_dvec3();
-        Self {
+        let known = |truth: ObjectTruth| crate::capture::truth::ObjectTruth {
             albedo: Some(wide(truth.albedo)),
             emission: wide(truth.emission),
             exitance: truth.exitance.map(wide),
             roughness: truth.roughness.map(f64::from),
             textured: truth.textured,
-        }
-    }
-}
-
-impl From<BTreeMap<String, ObjectTruth>> for crate::capture::truth::Truth {
-    fn from(objects: BTreeMap<String, ObjectTruth>) -> Self {
+        };
         Self {
-            objects: objects.into_iter().map(|(n, o)| (n, o.into())).collect(),
+            objects: objects.into_iter().map(|(n, o)| (n, known(o))).collect(),
         }
     }
 }
@@ -112,19 +107,9 @@ pub fn objects(world: &LitScene) -> BTreeMap<String, ObjectTruth> {
 
 /// Number of pixels of all cameras whose centre sees each object.
 pub fn seen_pixels(world: &LitScene) -> Vec<u64> {
-    let scene = &world.scene;
-    let mut seen = vec![0; scene.objects.len()];
-    for camera in &scene.cameras {
-        for y in 0..camera.intrinsics.height {
-            for x in 0..camera.intrinsics.width {
-                let center = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
-                if let Some(hit) = scene.intersect(&camera.ray(center)) {
-                    seen[scene.object_of[hit.triangle as usize] as usize] += 1;
-                }
-            }
-        }
-    }
-    seen
+    let objects = 0..world.scene.objects.len();
+    let ids = world.scene.ids();
+    objects.map(|object| ids.seen_pixels(object)).collect()
 }
 
 /// The true albedo seen by a camera, averaged over 4 × 4 points of each pixel.

@@ -9,14 +9,12 @@ use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::scene::visibility::NOTHING;
 use glam::Vec2;
-use image::{ImageBuffer, Luma};
 use rayon::prelude::*;
 use std::path::Path;
 use std::sync::Arc;
 
 /// A pixel contradicts the mesh if the difference exceeds [`MEDIANS`] × the frame's median difference + [`DEPTH_FRACTION`] × depth.
 const MEDIANS: f64 = 5.0;
-/// See [`MEDIANS`].
 const DEPTH_FRACTION: f64 = 0.02;
 /// Relative tolerance of the aspect ratio between a depth image and its photograph.
 const ASPECT_TOLERANCE: f64 = 0.02;
@@ -67,32 +65,6 @@ pub fn compare(
     (photographs, warnings)
 }
 
-/// A depth image of the same view as a photograph.
-struct Depth {
-    image: ImageBuffer<Luma<u16>, Vec<u16>>,
-    /// Metres per unit.
-    unit: f64,
-}
-
-impl Depth {
-    /// Whether the aspect ratios agree.
-    fn matches_aspect_of(&self, photograph: &Photograph) -> bool {
-        let aspect = |(width, height): (u32, u32)| f64::from(width) / f64::from(height.max(1));
-        let size = self.image.dimensions();
-        let ratio = aspect(size) / aspect((photograph.width, photograph.height));
-        size.0 > 0 && size.1 > 0 && (ratio - 1.0).abs() < ASPECT_TOLERANCE
-    }
-
-    /// Depth in metres along the optical axis at a point in fractions of width and height; `None` where it is missing.
-    fn at(&self, fraction: Vec2) -> Option<f64> {
-        let (width, height) = self.image.dimensions();
-        let x = ((fraction.x * width as f32) as u32).min(width - 1);
-        let y = ((fraction.y * height as f32) as u32).min(height - 1);
-        let [value] = self.image.get_pixel(x, y).0;
-        (value > 0).then(|| f64::from(value) * self.unit)
-    }
-}
-
 /// Marks the pixels that contradict the mesh by a depth image as unusable; also returns their number.
 fn mask(
     path: &Path,
@@ -102,21 +74,25 @@ fn mask(
     photograph: &Photograph,
 ) -> Result<(Photograph, u64)> {
     let image = decode(path)?;
-    let depth = Depth { image, unit };
-    if !depth.matches_aspect_of(photograph) {
-        return Err(Error::file(
-            path,
-            "has another aspect ratio than its photograph",
-            "its pixels are not compared",
-        ));
+    let (width, height) = image.dimensions();
+    let aspect = |width: u32, height: u32| f64::from(width) / f64::from(height.max(1));
+    let ratio = aspect(width, height) / aspect(photograph.width, photograph.height);
+    let matches = width > 0 && height > 0 && (ratio - 1.0).abs() < ASPECT_TOLERANCE;
+    if !matches {
+        let problem = "has another aspect ratio than its photograph";
+        return Err(Error::file(path, problem, "its pixels are not compared"));
     }
-    let size = [photograph.width, photograph.height];
+    let size = Vec2::new(photograph.width as f32, photograph.height as f32);
     let camera = &scene.cameras[frame];
     let triangles = &scene.ids().triangles[frame];
     let pixels: Vec<Option<(f64, f64)>> = (triangles.iter().enumerate())
         .map(|(pixel, &triangle)| {
             let at = camera.corner(pixel) + 0.5;
-            let measured = depth.at(at / Vec2::new(size[0] as f32, size[1] as f32))?;
+            let fraction = at / size;
+            let x = ((fraction.x * width as f32) as u32).min(width - 1);
+            let y = ((fraction.y * height as f32) as u32).min(height - 1);
+            let [value] = image.get_pixel(x, y).0;
+            let measured = (value > 0).then(|| f64::from(value) * unit)?;
             Some((measured, mesh_depth(scene, camera, at, triangle)))
         })
         .collect();

@@ -9,7 +9,7 @@ pub mod texels;
 pub mod visibility;
 pub mod winding;
 
-use crate::capture::Capture;
+use crate::capture::{Capture, Frame};
 use crate::error::{Error, Result};
 use bvh::Bvh;
 use camera::Camera;
@@ -72,24 +72,18 @@ impl Scene {
             return refused("the mesh has no triangles");
         }
         let origin = (low + high) * 0.5;
-        let positions: Vec<Vec3> = mesh
-            .positions
-            .iter()
-            .map(|&p| (p - origin).as_vec3())
-            .collect();
+        let local = |p: &DVec3| (*p - origin).as_vec3();
+        let positions: Vec<Vec3> = mesh.positions.iter().map(local).collect();
 
         // Compute normals and areas in f64, since slivers would lose theirs in f32.
         let mut normals = Vec::with_capacity(mesh.triangles.len());
         let mut areas = Vec::with_capacity(mesh.triangles.len());
-        let mut objects: Vec<Object> = mesh
-            .objects
-            .iter()
-            .map(|name| Object {
-                name: name.clone(),
-                triangles: Vec::new(),
-                area: 0.0,
-            })
-            .collect();
+        let object = |name: &String| Object {
+            name: name.clone(),
+            triangles: Vec::new(),
+            area: 0.0,
+        };
+        let mut objects: Vec<Object> = mesh.objects.iter().map(object).collect();
         for (index, (&[a, b, c], &object)) in mesh.triangles.iter().zip(&mesh.object_of).enumerate()
         {
             let corner = |i: u32| positions[i as usize].as_dvec3();
@@ -103,11 +97,7 @@ impl Scene {
             return refused("every triangle of the mesh has zero area");
         }
 
-        let cameras = capture
-            .frames
-            .iter()
-            .map(|frame| Camera::new(&frame.intrinsics, &frame.pose, origin))
-            .collect();
+        let camera = |frame: &Frame| Camera::new(&frame.intrinsics, &frame.pose, origin);
         let bvh = Bvh::new(&positions, &mesh.triangles);
         Ok(Self {
             origin,
@@ -117,7 +107,7 @@ impl Scene {
             normals,
             areas,
             objects,
-            cameras,
+            cameras: capture.frames.iter().map(camera).collect(),
             up: capture.up.as_vec3(),
             diameter: (high - low).length() as f32,
             scanned: capture.segmentation.is_some(),

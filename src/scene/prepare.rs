@@ -121,12 +121,8 @@ fn unseen(scene: &Scene) -> Vec<String> {
 /// "1 object", "1,234 objects".
 fn count(n: usize, one: &str) -> String {
     let digits = n.to_string();
-    let grouped: Vec<&str> = digits
-        .as_bytes()
-        .rchunks(3)
-        .rev()
-        .filter_map(|group| std::str::from_utf8(group).ok())
-        .collect();
+    let groups = digits.as_bytes().rchunks(3).rev();
+    let grouped: Vec<&str> = groups.filter_map(|g| std::str::from_utf8(g).ok()).collect();
     let plural = if n == 1 { "" } else { "s" };
     format!("{} {one}{plural}", grouped.join(","))
 }

@@ -28,20 +28,23 @@ impl Scene {
     pub fn ids(&self) -> &IdBuffers {
         self.ids.get_or_init(|| IdBuffers::new(self))
     }
+
+    /// The triangle that the centre of each pixel of a camera sees, row by row from the top left, or [`NOTHING`].
+    pub fn seen_by(&self, camera: &Camera) -> Vec<u32> {
+        let seen = |pixel| {
+            let hit = self.intersect(&camera.ray(camera.corner(pixel) + 0.5));
+            hit.map_or(NOTHING, |hit| hit.triangle)
+        };
+        (0..camera.pixels()).into_par_iter().map(seen).collect()
+    }
 }
 
 impl IdBuffers {
     /// Casts one ray through the centre of every pixel of every camera.
     pub fn new(scene: &Scene) -> Self {
-        let triangles = |camera: &Camera| {
-            let seen = |pixel| {
-                let hit = scene.intersect(&camera.ray(camera.corner(pixel) + 0.5));
-                hit.map_or(NOTHING, |hit| hit.triangle)
-            };
-            (0..camera.pixels()).into_par_iter().map(seen).collect()
-        };
+        let cameras = scene.cameras.iter();
         let mut buffers = Self {
-            triangles: scene.cameras.iter().map(triangles).collect(),
+            triangles: cameras.map(|camera| scene.seen_by(camera)).collect(),
             front_pixels: Vec::new(),
             back_pixels: Vec::new(),
         };

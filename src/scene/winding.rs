@@ -25,8 +25,7 @@ const BRIGHT_QUANTILE: f64 = 0.95;
 
 /// Reverses the winding of objects where the photographs contradict it; returns a sentence about each change.
 ///
-/// `scene`, `ids` and `photographs` (one per camera, of its size) must be those of `capture`. If the result is not empty, the
-/// scene must be rebuilt.
+/// `scene`, `ids` and `photographs` (one per camera, of its size) must be those of `capture`. Any change makes the scene invalid.
 pub fn turn_over(
     capture: &mut Capture,
     scene: &Scene,

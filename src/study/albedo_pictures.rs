@@ -4,8 +4,8 @@ use crate::capture::truth::Truth;
 use crate::capture::{Capture, Frame};
 use crate::error::Result;
 use crate::inverse::estimate::Estimate;
-use crate::scene::Scene;
 use crate::scene::camera::Camera;
+use crate::scene::{Object, Scene};
 use crate::transport::material::Material;
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
@@ -13,11 +13,9 @@ use rayon::prelude::*;
 /// Points along a pixel's side at which the estimate is sampled; the truth is box-filtered in the same way.
 const SIDE: u32 = 4;
 
-/// Squared errors pooled over frames, and the visibility of objects.
+/// Squared errors pooled over frames.
 #[derive(Debug, Clone, Default)]
 pub struct PictureErrors {
-    /// For each object, the number of pixels whose centre sees it.
-    pub seen_pixels: Vec<u64>,
     squares: f64,
     values: u64,
     /// For each object: number of compared pixels, sum of the true albedo, and sum of its squared length.
@@ -47,8 +45,7 @@ fn decibel(squares: f64, values: u64) -> Option<f64> {
     (values > 0 && squares > 0.0).then(|| -10.0 * (squares / values as f64).log10())
 }
 
-/// Compares estimated and true albedo in all frames, and counts the pixels that see each object. `true_albedo`
-/// returns a frame's true albedo by rows, or `None` if it has none.
+/// Compares estimated and true albedo in all frames. `true_albedo` returns a frame's true albedo by rows, or `None` if it has none.
 ///
 /// # Errors
 /// As `true_albedo`.
@@ -60,36 +57,27 @@ pub fn compare(
     true_albedo: impl Fn(usize, &Frame) -> Result<Option<Vec<Vec3>>>,
 ) -> Result<PictureErrors> {
     let materials = estimate.materials();
-    let emitters: Vec<bool> = scene
-        .objects
-        .iter()
-        .map(|o| truth.objects.get(&o.name).is_some_and(|t| t.is_emitter()))
-        .collect();
+    let emits = |o: &Object| (truth.objects.get(&o.name)).is_some_and(|t| t.is_emitter());
+    let emitters: Vec<bool> = scene.objects.iter().map(emits).collect();
     let mut errors = PictureErrors {
-        seen_pixels: vec![0; scene.objects.len()],
         objects: vec![(0, DVec3::ZERO, 0.0); scene.objects.len()],
         ..PictureErrors::default()
     };
     for (index, frame) in capture.frames.iter().enumerate() {
+        let Some(known) = true_albedo(index, frame)? else {
+            continue;
+        };
         let camera = Camera::new(&frame.intrinsics, &frame.pose, scene.origin);
-        let known = true_albedo(index, frame)?;
-        let grid = if known.is_some() { SIDE } else { 0 };
-        let seen = sample_pixels(scene, &camera, &materials, &emitters, grid);
-        for (pixel, seen) in seen.into_iter().enumerate() {
-            let Some((object, albedo)) = seen else {
-                continue;
-            };
-            errors.seen_pixels[object] += 1;
-            let known = known.as_ref().and_then(|k| k.get(pixel));
-            if let Some((albedo, known)) = albedo.zip(known) {
-                let known = known.as_dvec3();
-                errors.squares += (albedo.as_dvec3() - known).length_squared();
-                errors.values += 3;
-                let (pixels, sum, squares) = &mut errors.objects[object];
-                *pixels += 1;
-                *sum += known;
-                *squares += known.length_squared();
-            }
+        let found = albedos(scene, &camera, &materials, &emitters);
+        let both = found.into_iter().zip(known);
+        for ((object, albedo), known) in both.filter_map(|(found, known)| Some((found?, known))) {
+            let known = known.as_dvec3();
+            errors.squares += (albedo.as_dvec3() - known).length_squared();
+            errors.values += 3;
+            let (pixels, sum, squares) = &mut errors.objects[object];
+            *pixels += 1;
+            *sum += known;
+            *squares += known.length_squared();
         }
     }
     Ok(errors)
@@ -100,45 +88,44 @@ pub fn seen_pixels(capture: &Capture, scene: &Scene) -> Vec<u64> {
     let mut seen = vec![0; scene.objects.len()];
     for frame in &capture.frames {
         let camera = Camera::new(&frame.intrinsics, &frame.pose, scene.origin);
-        let pixels = sample_pixels(scene, &camera, &[], &[], 0);
-        for (object, _) in pixels.into_iter().flatten() {
-            seen[object] += 1;
+        for triangle in scene.seen_by(&camera) {
+            if let Some(&object) = scene.object_of.get(triangle as usize) {
+                seen[object as usize] += 1;
+            }
         }
     }
     seen
 }
 
-/// Samples every pixel: the object at its centre, and its mean albedo at `grid` × `grid` points, which is `None` if part of it sees
-/// an emitter or no surface.
-fn sample_pixels(
+/// The object at the centre of every pixel and the pixel's mean albedo; `None` if part of it sees an emitter or no surface.
+fn albedos(
     scene: &Scene,
     camera: &Camera,
     materials: &[Material],
     emitters: &[bool],
-    grid: u32,
-) -> Vec<Option<(usize, Option<Vec3>)>> {
+) -> Vec<Option<(usize, Vec3)>> {
     let at = |point: Vec2| {
         let hit = scene.intersect(&camera.ray(point))?;
         Some((scene.object_of[hit.triangle as usize] as usize, hit))
     };
     let albedo = |corner: Vec2| {
         let mut sum = Vec3::ZERO;
-        for i in 0..grid * grid {
-            let offset = |i: u32| (i as f32 + 0.5) / grid as f32;
-            let (object, hit) = at(corner + Vec2::new(offset(i % grid), offset(i / grid)))?;
+        for i in 0..SIDE * SIDE {
+            let offset = |i: u32| (i as f32 + 0.5) / SIDE as f32;
+            let (object, hit) = at(corner + Vec2::new(offset(i % SIDE), offset(i / SIDE)))?;
             if emitters[object] {
                 return None;
             }
             sum += materials.get(object)?.albedo_at(&hit);
         }
-        (grid > 0).then(|| sum / (grid * grid) as f32)
+        Some(sum / (SIDE * SIDE) as f32)
     };
     (0..camera.pixels())
         .into_par_iter()
         .map(|pixel| {
             let corner = camera.corner(pixel);
             let (object, _) = at(corner + 0.5)?;
-            Some((object, albedo(corner)))
+            Some((object, albedo(corner)?))
         })
         .collect()
 }
@@ -159,14 +146,10 @@ mod tests {
             squares: 6.0 * 0.01,
             values: 6,
             objects,
-            ..PictureErrors::default()
         };
-        assert!(errors.psnr().is_some_and(|d| (d - 20.0).abs() < 1e-9));
-        let constant = errors.psnr_constant_per_object();
-        assert!(
-            constant.is_some_and(|d| (d - 20.0).abs() < 1e-9),
-            "{constant:?}"
-        );
+        for found in [errors.psnr(), errors.psnr_constant_per_object()] {
+            assert!(found.is_some_and(|d| (d - 20.0).abs() < 1e-9), "{found:?}");
+        }
         assert_eq!(PictureErrors::default().psnr(), None);
     }
 }

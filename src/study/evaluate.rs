@@ -88,7 +88,8 @@ impl Reference {
         Self {
             truth,
             seen_pixels: albedo_pictures::seen_pixels(capture, scene),
-            open_scale: open_scale(photographs),
+            // Photographs that saturate come from a camera with unknown exposure.
+            open_scale: photographs.iter().any(|p| p.saturation.is_finite()),
         }
     }
 
@@ -103,11 +104,8 @@ impl Reference {
                 Some((object.name.clone(), errors))
             })
             .collect();
-        let scored: Vec<&ObjectErrors> = per_object
-            .iter()
-            .map(|(_, errors)| errors)
-            .filter(|errors| errors.scored)
-            .collect();
+        let all = per_object.iter().map(|(_, errors)| errors);
+        let scored: Vec<&ObjectErrors> = all.filter(|errors| errors.scored).collect();
         let absolute: Vec<f64> = scored
             .iter()
             .flat_map(|o| {
@@ -154,21 +152,12 @@ pub fn evaluate(
         let picture = read_albedo(folder, index, &frame.intrinsics)?;
         Ok(picture.map(|picture| picture.pixels))
     })?;
-    let reference = Reference {
-        truth,
-        seen_pixels: pictures.seen_pixels.clone(),
-        open_scale: open_scale(photographs),
-    };
+    let reference = Reference::new(truth, capture, scene, photographs);
     Ok(Evaluation {
         albedo_psnr: pictures.psnr(),
         albedo_psnr_constant_per_object: pictures.psnr_constant_per_object(),
         ..reference.errors(scene, estimate)
     })
-}
-
-/// Whether the scale is open: photographs that saturate come from a camera with unknown exposure.
-fn open_scale(photographs: &[Arc<Photograph>]) -> bool {
-    photographs.iter().any(|p| p.saturation.is_finite())
 }
 
 fn of_object(

@@ -31,10 +31,8 @@ impl Machine {
 
     /// As text: "2 threads of Intel Xeon (2 cores)".
     pub fn words(&self) -> String {
-        let s = if self.threads == 1 { "" } else { "s" };
-        format!(
-            "{} thread{s} of {} ({} cores)",
-            self.threads, self.cpu, self.cores
-        )
+        let (cores, threads) = (self.cores, self.threads);
+        let s = if threads == 1 { "" } else { "s" };
+        format!("{threads} thread{s} of {} ({cores} cores)", self.cpu)
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! Radiance is demodulated by albedo and smoothed by an edge-avoiding à-trous wavelet filter (Dammertz et al. 2010), whose weights
 //! fall off across normals, planes, objects, and luminance differences beyond the noise (Schied et al. 2017). The noise is
-//! estimated from two independent pictures of the same view, and each is smoothed by weights from the other one (Rousselle,
-//! Knaus and Zwicker 2012).
+//! estimated from two independent pictures of the view; each is smoothed by weights from the other (Rousselle, Knaus and Zwicker
+//! 2012).
 
 use crate::math::color::luminance;
 use crate::math::picture::Picture;
@@ -17,8 +17,7 @@ use rayon::prelude::*;
 const PASSES: u32 = 5;
 /// Cubic B-spline weights.
 const SPLINE: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
-/// Luminance differences between averages of 3 × 3 pixels are measured in units of this many standard deviations of a pixel's
-/// noise.
+/// Differences between luminances of 3 × 3 pixels are measured in this many standard deviations of a pixel's noise.
 const LUMINANCE_SIGMAS: f32 = 0.7;
 /// Power of the cosine between normals in the weights.
 const NORMAL_POWER: i32 = 64;
@@ -191,8 +190,7 @@ fn levels(light: &[[Vec3; 2]], guides: &[Option<Guide>], around: Around) -> Vec<
     (0..light.len()).into_par_iter().map(level).collect()
 }
 
-/// How far the luminance of a pixel lies outside of the range of its neighbours on the same object; 0 if less than that range, or
-/// without neighbours.
+/// How far the luminance of a pixel lies outside of the range of its neighbours on the same object; 0 if less than that range.
 fn beyond_neighbours(
     light: &[[Vec3; 2]],
     guides: &[Option<Guide>],
@@ -315,11 +313,8 @@ mod tests {
     }
 
     fn error(a: &Picture, b: &Picture) -> f32 {
-        let squares = a
-            .pixels
-            .iter()
-            .zip(&b.pixels)
-            .map(|(a, b)| (*a - *b).length_squared());
+        let pairs = a.pixels.iter().zip(&b.pixels);
+        let squares = pairs.map(|(a, b)| (*a - *b).length_squared());
         (squares.sum::<f32>() / a.pixels.len() as f32).sqrt()
     }
 

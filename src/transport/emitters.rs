@@ -76,10 +76,8 @@ impl FenwickTree {
         // Rounding of prefix sums may lead to a neighbour with zero weight.
         let start = position.min(n.checked_sub(1)?);
         let drawable = |&i: &usize| self.weights[i] > 0.0;
-        (0..=start)
-            .rev()
-            .find(drawable)
-            .or_else(|| (start..n).find(drawable))
+        let before = (0..=start).rev().find(drawable);
+        before.or_else(|| (start..n).find(drawable))
     }
 
     fn recompute(&mut self, i: usize) {

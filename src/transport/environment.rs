@@ -9,8 +9,7 @@ use std::f32::consts::PI;
 
 /// An equirectangular map of incident radiance, sampled in proportion to luminance × solid angle.
 ///
-/// Directions point towards the light in scene coordinates; the pole is the y axis, independent of `up`. For a box they start at
-/// its centre.
+/// Directions point towards the light in scene coordinates; the pole is y, whatever `up` is. For a box they start at its centre.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Environment {
     width: usize,
@@ -46,8 +45,7 @@ impl Environment {
         })
     }
 
-    /// The map with a sun beyond it that shines through some of its pixels, or through all. `None` if the number of `openings`
-    /// differs.
+    /// The map with a sun beyond it that shines through some or all of its pixels. `None` if the number of `openings` differs.
     pub fn with_sun(self, sun: Option<Sun>, openings: Option<Vec<bool>>) -> Option<Self> {
         let fit = (openings.as_ref()).is_none_or(|open| open.len() == self.pixels.len());
         fit.then_some(Self {
@@ -263,16 +261,13 @@ mod tests {
         }
         // π times the radiance, within 2 %: about five standard errors.
         for (sum, radiance) in sums.iter().zip([0.5, 3.0]) {
-            assert!(
-                (sum / (std::f64::consts::PI * radiance) - 1.0).abs() < 0.02,
-                "{sums:?}"
-            );
+            let ratio = sum / (std::f64::consts::PI * radiance);
+            assert!((ratio - 1.0).abs() < 0.02, "{sums:?}");
         }
         assert!(map.with_above(vec![Vec3::ONE; 3], Vec3::X).is_none());
     }
 
-    /// Irradiance of a surface under a sun and a grey box, by samples of the mixture and by samples of the sphere for the map
-    /// alone.
+    /// Irradiance of a surface under a sun and a grey box, by samples of the mixture.
     #[test]
     fn a_sun_gives_its_irradiance_beside_the_map() {
         let sun = Sun {
@@ -349,11 +344,7 @@ mod tests {
         let white = Environment::new(6, 3, vec![Vec3::ONE; 18]).expect("sizes fit");
         assert!((white.power() - 4.0 * std::f64::consts::PI).abs() < 1e-6);
         assert!(Environment::new(2, 2, vec![Vec3::ONE; 3]).is_none());
-        assert!(
-            Environment::new(1, 1, vec![Vec3::ZERO])
-                .expect("sizes fit")
-                .sample(Vec3::ONE, 0.5, [0.5; 2])
-                .is_none()
-        );
+        let black = Environment::new(1, 1, vec![Vec3::ZERO]).expect("sizes fit");
+        assert!(black.sample(Vec3::ONE, 0.5, [0.5; 2]).is_none());
     }
 }

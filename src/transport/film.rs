@@ -1,5 +1,6 @@
 //! Accumulates path samples into pictures; a pixel is the box-filtered mean of radiance over its area.
 
+use crate::math::picture::Picture;
 use crate::math::rng::Stream;
 use crate::scene::camera::Camera;
 use crate::transport::arrival::RayCount;
@@ -40,8 +41,7 @@ impl Film {
         }
     }
 
-    /// Adds `samples` paths to every pixel. Streams are keyed by (seed, frame, pixel, sample), so the result does not depend on
-    /// threads or on the split over calls.
+    /// Adds `samples` paths to every pixel. Keyed by (seed, frame, pixel, sample), so that threads and calls do not matter.
     pub fn add(
         &mut self,
         world: &impl World,
@@ -87,6 +87,15 @@ impl Film {
         self.rays += cast.rays;
         self.rejected += cast.rejected;
         self.samples += if is_last { samples } else { 0 };
+    }
+
+    /// Mean radiance as a picture; see [`Film::mean`].
+    pub fn picture(&self) -> Picture {
+        Picture {
+            width: self.width,
+            height: self.height,
+            pixels: self.mean(),
+        }
     }
 
     /// Mean radiance of each pixel; zero before the first sample.

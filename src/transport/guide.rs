@@ -56,12 +56,12 @@ const AROUND: [[f32; 2]; 4] = [[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 
 
 /// The features of all pixels of a camera at their centres. Albedo is averaged over the part of the pixel on the same object.
 pub fn guides(world: &impl World, camera: &Camera) -> Vec<Option<Guide>> {
-    guides_of(world, camera, &AROUND, |_, ray_at| Some(ray_at(OFFSETS[0])))
+    guides_where(world, camera, |_, _| true)
 }
 
 /// [`guides`] with the albedo at each pixel's centre: a fifth of the rays.
 pub fn guides_at_centers(world: &impl World, camera: &Camera) -> Vec<Option<Guide>> {
-    guides_of(world, camera, &[], |_, ray_at| Some(ray_at(OFFSETS[0])))
+    guides_of(world, camera, &[], |_, _| true)
 }
 
 /// [`guides`] at the first of a few points of each pixel whose ray satisfies `wanted`.
@@ -70,22 +70,20 @@ pub fn guides_where(
     camera: &Camera,
     wanted: impl Fn(usize, &Ray) -> bool + Sync,
 ) -> Vec<Option<Guide>> {
-    guides_of(world, camera, &AROUND, |pixel, ray_at| {
-        let mut rays = OFFSETS.into_iter().map(ray_at);
-        rays.find(|ray| wanted(pixel, ray))
-    })
+    guides_of(world, camera, &AROUND, wanted)
 }
 
-/// The features of all pixels along the ray that `choose` returns for each.
+/// The features of all pixels along their first ray that satisfies `wanted`, with albedo averaged over more positions in the pixel.
 fn guides_of(
     world: &impl World,
     camera: &Camera,
     around: &[[f32; 2]],
-    choose: impl Fn(usize, &dyn Fn([f32; 2]) -> Ray) -> Option<Ray> + Sync,
+    wanted: impl Fn(usize, &Ray) -> bool + Sync,
 ) -> Vec<Option<Guide>> {
     let guide = |pixel: usize| {
         let ray_at = |offset: [f32; 2]| camera.ray(camera.corner(pixel) + Vec2::from(offset));
-        let ray = choose(pixel, &ray_at)?;
+        let mut rays = OFFSETS.into_iter().map(ray_at);
+        let ray = rays.find(|ray| wanted(pixel, ray))?;
         let seen = world.intersect(&ray)?;
         let towards = -ray.direction.normalize_or_zero();
         let front = seen.normal.dot(towards) > 0.0;

@@ -57,20 +57,9 @@ impl LitScene {
             t: hit.t,
         }
     }
-}
 
-impl World for LitScene {
-    #[inline]
-    fn intersect(&self, ray: &Ray) -> Option<SurfacePoint> {
-        self.scene.intersect(ray).map(|hit| self.surface(&hit))
-    }
-
-    #[inline]
-    fn occluded(&self, ray: &Ray) -> bool {
-        self.scene.occluded(ray)
-    }
-
-    fn sample_emitter(&self, choice: f64, u: [f32; 2]) -> Option<EmitterSample> {
+    /// Samples a point on an emitter from one uniform number for the choice and two for the point. `None` if nothing emits.
+    pub fn sample_emitter(&self, choice: f64, u: [f32; 2]) -> Option<EmitterSample> {
         let (object, sample) = self.emitters.sample(&self.scene, choice, u)?;
         Some(EmitterSample {
             point: sample.point,
@@ -82,15 +71,29 @@ impl World for LitScene {
         })
     }
 
-    fn emitter_pdf(&self, surface: &SurfacePoint) -> f32 {
-        self.emitters.pdf(surface.object)
+    /// Probability of sampling an emitter of the mesh rather than the environment.
+    pub fn emitter_fraction(&self) -> f32 {
+        match (&self.outside, self.emitters.is_dark()) {
+            (None, _) => 1.0,
+            (Some(_), true) => 0.0,
+            (Some(_), false) => 0.5,
+        }
+    }
+}
+
+impl World for LitScene {
+    #[inline]
+    fn lit(&self) -> &LitScene {
+        self
     }
 
-    fn has_emitters(&self) -> bool {
-        !self.emitters.is_dark()
+    #[inline]
+    fn intersect(&self, ray: &Ray) -> Option<SurfacePoint> {
+        self.scene.intersect(ray).map(|hit| self.surface(&hit))
     }
 
-    fn environment(&self) -> Option<&Environment> {
-        self.outside.as_deref()
+    #[inline]
+    fn occluded(&self, ray: &Ray) -> bool {
+        self.scene.occluded(ray)
     }
 }

@@ -5,8 +5,7 @@
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 
-/// A unit direction in f64, with the largest component recomputed from the other two: its f32 rounding error would dominate them
-/// near the horizon.
+/// A unit direction in f64, with the largest component recomputed from the other two: its rounding would dominate near the horizon.
 fn widen(direction: Vec3) -> DVec3 {
     let mut wide = direction.as_dvec3();
     let axis = wide.abs().max_position();

@@ -1,7 +1,6 @@
 //! Open Image Denoise, loaded at run time if it is installed (Áfra 2019–2025, <https://www.openimagedenoise.org>).
 //!
-//! The library is not linked: without it, pictures are denoised by [`super::denoise`]. `RELIT_OIDN` names the library's file if the
-//! system's search does not find it.
+//! It is not linked: without it, [`super::denoise`] is used. `RELIT_OIDN` names its file if the system does not find it.
 
 use crate::math::picture::Picture;
 use crate::transport::guide::Guide;

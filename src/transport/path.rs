@@ -99,8 +99,7 @@ pub fn radiance_by_origin(
     sample
 }
 
-/// Radiance of a white diffuse surface at a point on the side of `normal` (irradiance / π), estimated by one path. The actual
-/// albedo and emission there are ignored.
+/// Radiance of a white diffuse surface at a point on the side of `normal` (irradiance / π), by one path; its material is ignored.
 pub fn white_radiance(
     world: &impl World,
     surface: &SurfacePoint,
@@ -191,14 +190,14 @@ pub(super) fn follow(
     };
 
     loop {
-        // Find the next vertex.
         sample.rays += 1;
         let Some(surface) = world.intersect(&ray) else {
-            if let Some(environment) = world.environment() {
+            if let Some(environment) = &world.lit().outside {
                 let direction = ray.direction.normalize_or_zero();
                 let weight = bsdf_pdf.map_or(1.0, |pdf| {
                     let map_pdf = environment.pdf(ray.origin, direction);
-                    emission_weight(pdf, map_pdf * (1.0 - emitter_fraction(world)), options)
+                    let light_pdf = map_pdf * (1.0 - world.lit().emitter_fraction());
+                    emission_weight(pdf, light_pdf, options)
                 });
                 let light = throughput * environment.radiance(ray.origin, direction) * weight;
                 add(Origin::Outside, light);
@@ -206,13 +205,13 @@ pub(super) fn follow(
             break;
         };
 
-        // Add emission.
         let wo = -ray.direction.normalize_or_zero();
         let cos_emitter = surface.normal.dot(wo);
         if cos_emitter > 0.0 && surface.emission != Vec3::ZERO {
             let weight = bsdf_pdf.map_or(1.0, |pdf| {
                 let distance2 = (ray.direction * surface.t).length_squared();
-                let area_pdf = emitter_fraction(world) * world.emitter_pdf(&surface);
+                let lit = world.lit();
+                let area_pdf = lit.emitter_fraction() * lit.emitters.pdf(surface.object);
                 emission_weight(pdf, area_pdf * distance2 / cos_emitter, options)
             });
             let light = throughput * surface.emission * weight;
@@ -325,10 +324,11 @@ pub(super) fn draw_light(
     stream: &mut Stream,
 ) -> (Origin, Option<LightSample>) {
     let (pick, choice, u) = (stream.uniform(), stream.uniform_f64(), stream.uniform2());
-    let fraction = emitter_fraction(world);
+    let lit = world.lit();
+    let fraction = lit.emitter_fraction();
     let origin_towards = |wi| offset_origin(surface.point, surface.normal, &surface.corners, wi);
     if pick >= fraction {
-        let drawn = world.environment().and_then(|environment| {
+        let drawn = lit.outside.as_ref().and_then(|environment| {
             let (wi, pdf) = environment.sample(surface.point, choice, u)?;
             Some(LightSample {
                 wi,
@@ -339,7 +339,7 @@ pub(super) fn draw_light(
         });
         return (Origin::Outside, drawn);
     }
-    let Some(light) = world.sample_emitter(choice, u) else {
+    let Some(light) = lit.sample_emitter(choice, u) else {
         return (Origin::Outside, None);
     };
     let origin = Origin::Object(light.object);
@@ -358,15 +358,6 @@ pub(super) fn draw_light(
         ray: Ray::between(origin_towards(wi), to),
     };
     (origin, Some(drawn))
-}
-
-/// Probability of sampling an emitter of the mesh rather than the environment.
-pub fn emitter_fraction(world: &impl World) -> f32 {
-    match (world.environment(), world.has_emitters()) {
-        (None, _) => 1.0,
-        (Some(_), false) => 0.0,
-        (Some(_), true) => 0.5,
-    }
 }
 
 /// MIS weight of emission hit by BSDF sampling.

@@ -8,8 +8,7 @@ const GAP: f32 = 0.02;
 
 /// How rays map to directions of the environment map.
 ///
-/// A box is a parallax-corrected environment map: a ray maps to the direction from the box's centre to the point where it leaves
-/// the box.
+/// A box is a parallax-corrected environment map: a ray maps to the direction from the box's centre to where it leaves the box.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub enum Surroundings {
     /// Infinitely far: light depends on direction only.
@@ -129,10 +128,8 @@ mod tests {
             let seen = surroundings.from_map(origin, direction);
             let back = surroundings.map_direction(origin, seen);
             assert!((back - direction).length() < 1e-4, "{direction} {back}");
-            assert_eq!(
-                Surroundings::Far.map_direction(origin, direction),
-                direction
-            );
+            let far = Surroundings::Far.map_direction(origin, direction);
+            assert_eq!(far, direction);
         }
         let moved = surroundings.map_direction(Vec3::new(2.0, 0.0, -1.0), Vec3::Y);
         assert!(moved.x > 0.1 && moved.y < 0.99);
@@ -168,10 +165,8 @@ mod tests {
     fn no_points_and_one_point_have_no_box_and_rays_that_lead_away_find_their_direction() {
         assert_eq!(Surroundings::around(std::iter::empty()), None);
         assert_eq!(Surroundings::around([Vec3::ONE].into_iter()), None);
-        assert_eq!(
-            Surroundings::around([Vec3::NAN, Vec3::ONE].into_iter()),
-            None
-        );
+        let spoilt = [Vec3::NAN, Vec3::ONE];
+        assert_eq!(Surroundings::around(spoilt.into_iter()), None);
         let away = unit_box().map_direction(Vec3::new(9.0, 0.0, 0.0), Vec3::X);
         assert_eq!(away, Vec3::X);
     }

@@ -9,8 +9,7 @@ use rayon::prelude::*;
 /// Weight of a pixel of the small render that sees another surface, so that a thin surface that it missed gets some light.
 const OTHER_SURFACE: f32 = 1e-4;
 
-/// The picture of a view from a smaller render of it. `seen` and `seen_small` are the features of both pictures' pixels, row by
-/// row.
+/// The picture of a view from a smaller render of it. `seen` and `seen_small` are the features of both pictures' pixels.
 ///
 /// Light, which is radiance over albedo, is averaged over the nearest 3 × 3 pixels of the small render by a quadratic B-spline and
 /// by how alike the surfaces are. Emitters get their own radiance, and the background that of the small render.
@@ -27,16 +26,14 @@ pub fn upsample(
             None => radiance,
         })
         .collect();
-    let columns: Vec<Taps> = (0..width)
-        .map(|x| Taps::new(x, width, small.width))
-        .collect();
+    let columns: Vec<_> = (0..width).map(|x| taps(x, width, small.width)).collect();
     let pixel = |pixel: usize| {
-        let column = &columns[pixel % width as usize];
-        let row = Taps::new((pixel / width as usize) as u32, height, small.height);
+        let column = columns[pixel % width as usize];
+        let row = taps((pixel / width as usize) as u32, height, small.height);
         let guide = seen[pixel].as_ref();
         let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
-        for (y, weight_y) in row.pixels() {
-            for (x, weight_x) in column.pixels() {
+        for (y, weight_y) in row {
+            for (x, weight_x) in column {
                 let from = y * small.width as usize + x;
                 let alike = match (guide, &seen_small[from]) {
                     (None, None) => 1.0,
@@ -52,47 +49,27 @@ pub fn upsample(
         let light = sum / weights.max(f32::MIN_POSITIVE);
         guide.map_or(light, |guide| guide.modulated(light))
     };
+    let pixels = (0..width as usize * height as usize).into_par_iter();
     Picture {
         width,
         height,
-        pixels: (0..width as usize * height as usize)
-            .into_par_iter()
-            .map(pixel)
-            .collect(),
+        pixels: pixels.map(pixel).collect(),
     }
 }
 
-/// The three pixels of a small row or column that one pixel is interpolated from.
-struct Taps {
-    /// The middle one.
-    middle: i64,
-    weights: [f32; 3],
-    count: u32,
-}
-
-impl Taps {
-    /// The taps of pixel `i` of `count`, of `small` pixels.
-    fn new(i: u32, count: u32, small: u32) -> Self {
-        let at = (f64::from(i) + 0.5) * f64::from(small) / f64::from(count.max(1)) - 0.5;
-        let middle = at.round();
-        let off = (at - middle) as f32;
-        Self {
-            middle: middle as i64,
-            weights: [
-                0.5 * (0.5 - off).powi(2),
-                0.75 - off * off,
-                0.5 * (0.5 + off).powi(2),
-            ],
-            count: small,
-        }
-    }
-
-    /// Pixels with their weights; those beyond the edge repeat the last one.
-    fn pixels(&self) -> impl Iterator<Item = (usize, f32)> {
-        let last = i64::from(self.count.max(1)) - 1;
-        let at = move |i: i64| (self.middle + i - 1).clamp(0, last) as usize;
-        (0..3).map(move |i| (at(i), self.weights[i as usize]))
-    }
+/// The pixels of a row or column of `small` pixels that pixel `i` of `count` is interpolated from, with their weights. Those beyond
+/// the edge repeat the last one.
+fn taps(i: u32, count: u32, small: u32) -> [(usize, f32); 3] {
+    let at = (f64::from(i) + 0.5) * f64::from(small) / f64::from(count.max(1)) - 0.5;
+    let middle = at.round();
+    let off = (at - middle) as f32;
+    let last = i64::from(small.max(1)) - 1;
+    let pixel = |by: i64| (middle as i64 + by).clamp(0, last) as usize;
+    [
+        (pixel(-1), 0.5 * (0.5 - off).powi(2)),
+        (pixel(0), 0.75 - off * off),
+        (pixel(1), 0.5 * (0.5 + off).powi(2)),
+    ]
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The interface between the path tracer and a scene.
 
 use crate::scene::geometry::Ray;
-use crate::transport::environment::Environment;
+use crate::transport::lit::LitScene;
 use crate::transport::material::Lobe;
 use glam::Vec3;
 
@@ -60,23 +60,14 @@ pub fn towards_viewer(shading: Vec3, geometric: Vec3, wo: Vec3) -> Vec3 {
     (shading + side * (NORMAL_MARGIN - cos)).normalize_or(geometric)
 }
 
-/// Geometry, materials and emitters, as the path tracer needs them.
+/// What the rays of the path tracer meet, and what lights it.
 pub trait World: Sync {
+    /// The scene whose lamps and environment are all the light.
+    fn lit(&self) -> &LitScene;
+
     /// The nearest surface along a ray.
     fn intersect(&self, ray: &Ray) -> Option<SurfacePoint>;
 
     /// Whether anything blocks the ray between its ends.
     fn occluded(&self, ray: &Ray) -> bool;
-
-    /// Samples a point on an emitter from one uniform number for the choice and two for the point. `None` if nothing emits.
-    fn sample_emitter(&self, choice: f64, u: [f32; 2]) -> Option<EmitterSample>;
-
-    /// Pdf per square metre of [`World::sample_emitter`] for a point of this surface.
-    fn emitter_pdf(&self, surface: &SurfacePoint) -> f32;
-
-    /// Whether [`World::sample_emitter`] can return a sample.
-    fn has_emitters(&self) -> bool;
-
-    /// Environment light, hit by rays that escape.
-    fn environment(&self) -> Option<&Environment>;
 }

@@ -220,10 +220,8 @@ fn usable_uv(uv: Vec2) -> Vec2 {
 fn front_normals(corners: &Corners) -> [Vec3; 3] {
     let [a, b, c] = corners.positions;
     let geometric = (b - a).cross(c - a).normalize_or_zero().as_vec3();
-    let mut normals = corners
-        .normals
-        .unwrap_or([geometric; 3])
-        .map(|n| n.normalize_or(geometric));
+    let own = corners.normals.unwrap_or([geometric; 3]);
+    let mut normals = own.map(|n| n.normalize_or(geometric));
     if normals.iter().map(|n| n.dot(geometric)).sum::<f32>() < 0.0 {
         normals = normals.map(|n| -n);
     }

@@ -84,8 +84,7 @@ fn open_library(referrer: &Path, name: &Path) -> Result<(PathBuf, Vec<u8>)> {
     Ok((found, bytes))
 }
 
-/// Completes an MTL file for tobj, which requires three numbers a colour: a single number is repeated. `None` where a
-/// colour has two numbers or none.
+/// Completes an MTL file for tobj, which wants three numbers a colour: a single one is repeated. `None` where one has two or none.
 fn with_three_number_colors(bytes: &[u8]) -> Option<String> {
     let text = String::from_utf8_lossy(bytes);
     let mut whole = String::with_capacity(text.len());

@@ -108,8 +108,7 @@ impl ObjectSurface {
 
     /// The material. `corner_uvs` are the texture coordinates of a texture.
     ///
-    /// A metal has no diffuse reflectance; its specular reflectance is its base colour, or the mean of its texture,
-    /// since an object has one lobe.
+    /// A metal has no diffuse reflectance; its specular one is its base colour, or its texture's mean, as an object has one lobe.
     pub fn material(&self, corner_uvs: Option<&Arc<Vec<[Vec2; 3]>>>) -> Material {
         let diffuse = self.base_color * (1.0 - self.metallic);
         let (albedo, mean) = match (&self.texture, corner_uvs) {

@@ -25,7 +25,6 @@ pub fn vase(m: &mut Modeller, height: f64) {
     m.lathe(&OUTLINE.map(|[r, y]| [r * height, y * height]), 16);
 }
 
-/// A shallow bowl.
 pub fn bowl(m: &mut Modeller, radius: f64) {
     const OUTLINE: [[f64; 2]; 9] = [
         [0.35, 0.00],

@@ -32,11 +32,8 @@ pub struct Support {
 
 /// Builds a generated room.
 pub struct Furnisher {
-    /// Source of all random numbers.
     pub stream: Stream,
-    /// Mesh built so far.
     pub modeller: Modeller,
-    /// Material of each object.
     pub materials: Vec<Material>,
     /// Width, height and depth in metres; the floor is y = 0, with its centre at the origin.
     pub size: DVec3,
@@ -44,11 +41,8 @@ pub struct Furnisher {
     pub occupied: Vec<(DVec2, f64)>,
     /// Tops of furniture.
     pub supports: Vec<Support>,
-    /// Views of its photographs.
     pub views: Vec<View>,
-    /// Light from outside.
     pub outside: Option<Arc<Environment>>,
-    /// Samples per pixel of its photographs.
     pub samples: u32,
 }
 
@@ -72,7 +66,6 @@ impl Furnisher {
         furnisher
     }
 
-    /// Draws a uniform number.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.stream.uniform_f64()
     }

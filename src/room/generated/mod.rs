@@ -1,23 +1,19 @@
 //! Rooms generated at random from a seed, in families. Settings are chosen and tested on them instead of on captures.
 //!
-//! Each family has its own difficulty. Its rooms differ in size, light, colours and number of photographs. The same
-//! (family, seed, size) gives the same bits.
+//! Each family has its own difficulty. Rooms differ in size, light, colours and views. (Family, seed, size) gives the same bits.
 
 mod clutter;
-mod family;
 mod furnisher;
 mod glossy;
 mod patterned;
 mod phone;
 mod photographed;
-mod plain;
 mod scanned;
 mod sparse;
 mod unseen;
 mod white;
 mod window;
 
-pub use family::Family;
 pub use photographed::Generated;
 
 use crate::error::Result;
@@ -25,11 +21,47 @@ use crate::room::Room;
 use crate::room::photographs::{self, Rendering};
 use furnisher::Furnisher;
 use photographed::Draft;
+use serde::{Deserialize, Serialize};
+
+/// A kind of generated room. Its number is a key of the random numbers of its rooms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Family {
+    /// Lamps in view.
+    Plain = 0,
+    /// No lamp in view.
+    Unseen = 1,
+    /// Light from outside.
+    Window = 2,
+    /// Hundreds of objects.
+    Clutter = 3,
+    /// Textures.
+    Patterned = 4,
+    /// Specular lobes.
+    Glossy = 5,
+    /// Many bounces.
+    White = 6,
+    /// Few and noisy photographs.
+    Sparse = 7,
+    /// Photographs like a phone's.
+    Phone = 8,
+    /// Photographs like a phone's, and a mesh fused from depth images.
+    Scanned = 9,
+}
+
+/// A plain room: shell, one to five lamps, up to fourteen pieces of furniture, four to twelve views.
+fn plain(f: &mut Furnisher, _size: [u32; 2]) {
+    f.shell();
+    f.lamps();
+    f.furniture();
+    f.look_around(4, 12);
+    f.expose(8.0, 64.0);
+}
 
 /// Furnishes room `seed` of a family for photographs of a size in pixels.
 fn draft(family: Family, seed: u64, size: [u32; 2]) -> Draft {
     let furnish = match family {
-        Family::Plain => plain::furnish,
+        Family::Plain => plain,
         Family::Unseen => unseen::furnish,
         Family::Window => window::furnish,
         Family::Clutter => clutter::furnish,
@@ -45,14 +77,51 @@ fn draft(family: Family, seed: u64, size: [u32; 2]) -> Draft {
     Draft::new(family, seed, size, furnisher)
 }
 
-/// Plain room `seed` and the rendering of its photographs at a size in pixels, with 8 to 64 samples per pixel, so
-/// that their noise varies widely.
+/// Plain room `seed` and the rendering of its photographs at a size in pixels, with 8 to 64 samples per pixel.
 pub fn generate(seed: u64, size: [u32; 2]) -> (Room, Rendering) {
     let plain = draft(Family::Plain, seed, size);
     (plain.room, plain.rendering)
 }
 
 impl Family {
+    /// All families.
+    pub const ALL: [Self; 10] = [
+        Self::Plain,
+        Self::Unseen,
+        Self::Window,
+        Self::Clutter,
+        Self::Patterned,
+        Self::Glossy,
+        Self::White,
+        Self::Sparse,
+        Self::Phone,
+        Self::Scanned,
+    ];
+
+    /// Their names on the command line and in files, in the same order.
+    pub const NAMES: [&'static str; Self::ALL.len()] = [
+        "plain",
+        "unseen",
+        "window",
+        "clutter",
+        "patterned",
+        "glossy",
+        "white",
+        "sparse",
+        "phone",
+        "scanned",
+    ];
+
+    /// Name on the command line and in files.
+    pub const fn name(self) -> &'static str {
+        Self::NAMES[self as usize]
+    }
+
+    /// The family with a name.
+    pub fn of_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|family| family.name() == name)
+    }
+
     /// Generates room `seed` of the family, with photographs of a size in pixels.
     ///
     /// # Errors

@@ -23,7 +23,6 @@ const MIDDLE_GREY: f64 = 0.18;
 /// Smallest luminance for automatic exposure, relative to the arithmetic mean.
 const MIN_LUMINANCE: f32 = 1e-3;
 
-/// A plain room.
 pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
     f.shell();
     f.lamps();
@@ -32,7 +31,6 @@ pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
     f.expose(24.0, 96.0);
 }
 
-/// The room, photographed by a phone.
 pub fn photograph(draft: Draft) -> Result<Generated> {
     let lit = draft.lit()?;
     let rendered = render_lit(&lit, &draft.rendering);
@@ -45,7 +43,6 @@ pub fn photograph(draft: Draft) -> Result<Generated> {
 
 /// Properties of a phone's camera.
 struct Phone {
-    /// Vignetting of the lens.
     vignetting: Vignetting,
     /// Standard deviation of the blur in pixels.
     blur: f64,
@@ -143,7 +140,6 @@ fn encode(picture: &Picture, quality: u8) -> Result<Vec<u8>> {
     Ok(file)
 }
 
-/// Decodes a JPEG photograph.
 pub fn decode(file: &[u8]) -> Result<Photograph> {
     let image = image::load_from_memory_with_format(file, ImageFormat::Jpeg)
         .map_err(|error| broken(&error))?

@@ -6,15 +6,13 @@ use crate::capture::truth::Truth;
 use crate::error::Result;
 use crate::math::picture::Picture;
 use crate::math::rng::splitmix64;
-use crate::room::generated::family::Family;
+use crate::room::generated::Family;
 use crate::room::generated::furnisher::Furnisher;
 use crate::room::model::Room;
 use crate::room::photographs::Rendering;
 use crate::room::truth;
-use crate::scene::geometry::Hit;
 use crate::transport::environment::Environment;
 use crate::transport::lit::LitScene;
-use glam::{Vec2, Vec3};
 use std::sync::Arc;
 
 /// Key of the photographs' random seed.
@@ -22,13 +20,9 @@ const PHOTOGRAPH_KEY: u64 = 0x6e6f_6973_6500;
 
 /// A room, its light from outside, and the settings of its photographs.
 pub struct Draft {
-    /// Its family.
     pub family: Family,
-    /// Its seed.
     pub seed: u64,
-    /// Mesh, materials and views.
     pub room: Room,
-    /// Light from outside.
     pub outside: Option<Arc<Environment>>,
     /// Random seed, samples and size of its photographs.
     pub rendering: Rendering,
@@ -50,18 +44,11 @@ impl Draft {
                 views: furnisher.views,
             },
             outside: furnisher.outside,
-            rendering: Rendering {
-                seed: splitmix64(seed ^ PHOTOGRAPH_KEY),
-                samples: furnisher.samples,
-                size,
-            },
+            rendering: Rendering::new(splitmix64(seed ^ PHOTOGRAPH_KEY), furnisher.samples, size),
         }
     }
 
-    /// The room with its true materials and light.
-    ///
-    /// # Errors
-    /// As [`Room::lit`].
+    /// The room with its true materials and light. Fails as [`Room::lit`] does.
     pub fn lit(&self) -> Result<LitScene> {
         let lit = self.room.lit(self.rendering.size)?;
         Ok(LitScene {
@@ -88,11 +75,9 @@ pub struct Generated {
     pub family: Family,
     /// Its seed.
     pub seed: u64,
-    /// Input of a solver: mesh and photographs in memory. If `capture.segmentation` is set, the mesh is to be cut into segments
-    /// like that of a scan.
+    /// Input of a solver: mesh and photographs in memory. If `capture.segmentation` is set, the mesh is to be segmented.
     pub capture: Capture,
-    /// The true room, of which the photographs were rendered: geometry, materials, light and cameras, in the capture's order of
-    /// frames.
+    /// The true room, as photographed: geometry, materials, light and cameras, in the capture's order of frames.
     pub lit: LitScene,
 }
 
@@ -108,19 +93,5 @@ impl Generated {
     /// The true albedo of a frame, averaged over each pixel; black where no surface is visible.
     pub fn albedo(&self, frame: usize) -> Picture {
         truth::albedo_picture(&self.lit, &self.lit.scene.cameras[frame])
-    }
-
-    /// The true emission at the pixel centres of a frame; black where no surface is visible.
-    pub fn emission(&self, frame: usize) -> Picture {
-        let camera = &self.lit.scene.cameras[frame];
-        let emitted = |hit: &Hit| {
-            let object = self.lit.scene.object_of[hit.triangle as usize];
-            self.lit.materials[object as usize].emission
-        };
-        Picture::from_fn(camera.intrinsics.width, camera.intrinsics.height, |x, y| {
-            let center = Vec2::new(x as f32, y as f32) + 0.5;
-            let hit = self.lit.scene.intersect(&camera.ray(center));
-            hit.as_ref().map_or(Vec3::ZERO, emitted)
-        })
     }
 }

@@ -107,12 +107,9 @@ pub fn scan(draft: Draft) -> Result<Generated> {
 /// and they would saturate and take their light out of the photograph.
 fn noiseless(lit: &LitScene, rendering: &Rendering) -> Vec<Picture> {
     let [a, b] = [0, 1].map(|half| {
-        let rendering = Rendering {
-            seed: rendering.seed ^ half << u32::BITS,
-            samples: rendering.samples.div_ceil(2),
-            ..*rendering
-        };
-        render_lit(lit, &rendering)
+        let seed = rendering.seed ^ half << u32::BITS;
+        let samples = rendering.samples.div_ceil(2);
+        render_lit(lit, &Rendering::new(seed, samples, rendering.size))
     });
     let pairs = a.iter().zip(&b).zip(&lit.scene.cameras);
     pairs

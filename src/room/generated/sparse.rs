@@ -13,7 +13,6 @@ use crate::transport::lit::LitScene;
 use crate::transport::path::PathOptions;
 use glam::Vec3;
 
-/// Number of photographs.
 pub const PHOTOGRAPHS: usize = 6;
 /// Range of the standard deviation of a pixel, relative to its value.
 pub const NOISE: [f64; 2] = [0.05, 0.15];
@@ -37,8 +36,7 @@ pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
     f.samples = ENOUGH_SAMPLES;
 }
 
-/// Photographs whose noise has a standard deviation drawn for the room: rendered until their own is below it, then the
-/// rest is added.
+/// Photographs whose noise has a standard deviation drawn for the room: rendered until theirs is below it, then the rest is added.
 pub fn photograph(draft: Draft) -> Result<Generated> {
     let lit = draft.lit()?;
     let mut stream = Stream::new(draft.seed, NOISE_KEY, 0, 0);

@@ -2,9 +2,9 @@
 
 use crate::room::generated::furnisher::{Furnisher, walls};
 use crate::room::shape::Modeller;
-use crate::transport::environment::{Environment, direction_of, pixel_of};
+use crate::transport::environment::{Environment, direction_of, pixel_of, row_solid_angle};
 use glam::{DVec3, Vec3};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 /// Width and height of the environment map; a pixel, such as the sun, has about three degrees.
@@ -127,8 +127,7 @@ fn reveal(m: &mut Modeller, opening: &Opening, sides: [DVec3; 3]) {
     m.grid(corner + u, v, out, 2, 1);
 }
 
-/// A sky of about the given radiance, brighter towards the horizon, over darker ground; in three of five rooms with a sun that
-/// shines into an opening.
+/// A sky of about a radiance, brighter at the horizon, over dark ground; in three of five rooms with a sun shining into an opening.
 fn sky(f: &mut Furnisher, level: f64, opening: &Opening) -> Option<Environment> {
     let tint = f.color(1.0, 0.4);
     let ground = f.color(1.0, 0.5) * f.between(0.1, 0.4) as f32;
@@ -156,9 +155,7 @@ fn sky(f: &mut Furnisher, level: f64, opening: &Opening) -> Option<Environment> 
         let (sin, cos) = elevation.sin_cos();
         let towards = DVec3::new(cos * azimuth.cos(), sin, cos * azimuth.sin()).as_vec3();
         let pixel = pixel_of(width, height, towards);
-        let row = (pixel / width) as f64;
-        let edge = |row: f64| (PI * row / height as f64).cos();
-        let solid_angle = TAU * (edge(row) - edge(row + 1.0)) / width as f64;
+        let solid_angle = row_solid_angle(pixel / width, width, height);
         pixels[pixel] += warmth * (strength * PI * level / solid_angle) as f32;
     }
     Environment::new(width, height, pixels)

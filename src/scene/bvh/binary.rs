@@ -1,7 +1,8 @@
 //! Builds a binary hierarchy top-down by the surface area heuristic, and collapses it optimally to eight children per node.
 
+use crate::scene::bvh::build::Tree;
 use crate::scene::bvh::split::{Bounds, Primitive, split};
-use crate::scene::bvh::{GROUP, Tree, WIDTH};
+use crate::scene::bvh::{GROUP, WIDTH};
 
 /// Leaves hold at most this many triangles.
 pub(super) const MAX_LEAF: usize = 4 * GROUP;
@@ -9,9 +10,7 @@ pub(super) const MAX_LEAF: usize = 4 * GROUP;
 /// A node of the binary hierarchy; the left child follows it in the list.
 pub(super) struct Binary {
     pub bounds: Bounds,
-    /// Its first primitive.
     pub first: u32,
-    /// Number of primitives below it.
     pub count: u32,
     /// Offset from this node to its right child; zero for a leaf.
     pub right: u32,
@@ -37,7 +36,6 @@ impl Binary {
 
 /// Subtrees with more primitives than this, and than 1 / [`TASKS`] of all, are built and laid out in parallel.
 const MIN_PARALLEL: usize = 8192;
-/// See [`MIN_PARALLEL`].
 const TASKS: usize = 64;
 
 /// Number of primitives above which a subtree is a parallel task.
@@ -45,8 +43,7 @@ pub(super) fn parallel_above(primitives: usize) -> usize {
     MIN_PARALLEL.max(primitives / TASKS)
 }
 
-/// Builds the hierarchy over primitives and reorders them; empty without primitives. Leaves hold at most `max_leaf` triangles, or
-/// one group.
+/// Builds the hierarchy over primitives and reorders them. Leaves hold at most `max_leaf` triangles, or one group.
 pub(super) fn build(primitives: &mut [Primitive], max_leaf: usize) -> Vec<Binary> {
     let mut nodes = Vec::new();
     if !primitives.is_empty() {

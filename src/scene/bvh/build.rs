@@ -3,25 +3,49 @@
 use crate::scene::bvh::binary::{Binary, MAX_LEAF, parallel_above};
 use crate::scene::bvh::pages::Pages;
 use crate::scene::bvh::split::{Bounds, Primitive};
-use crate::scene::bvh::{
-    Bvh, Child, GROUP, Group, InstructionSet, Node, Tree, TreeNode, WIDTH, binary,
-};
+use crate::scene::bvh::{Bvh, Child, GROUP, Group, InstructionSet, Node, WIDTH, binary};
 use glam::Vec3;
 use rayon::prelude::*;
 use std::cmp::Reverse;
 
-pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Bvh {
-    let corners = |triangle: u32| triangles[triangle as usize].map(|i| positions[i as usize]);
-    let mut primitives = primitives(triangles.len(), corners);
-    let binary = binary::build(&mut primitives, MAX_LEAF);
-    lay_out(&corners, &primitives, &binary, triangles.len())
+impl Bvh {
+    /// Builds the hierarchy of a mesh. Triangles with non-finite corners are never hit.
+    pub fn new(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+        let corners = |triangle: u32| triangles[triangle as usize].map(|i| positions[i as usize]);
+        let mut primitives = primitives(triangles.len(), corners);
+        let binary = binary::build(&mut primitives, MAX_LEAF);
+        lay_out(&corners, &primitives, &binary, triangles.len())
+    }
+
+    /// The hierarchy of a mesh from another builder's binary tree, collapsed at minimum cost. A triangle may be in several leaves.
+    pub fn from_tree(positions: &[Vec3], triangles: &[[u32; 3]], tree: &Tree) -> Self {
+        let corners = |triangle: u32| triangles[triangle as usize].map(|i| positions[i as usize]);
+        let (primitives, binary) = binary::from_tree(tree, &|t| Primitive::of(t, corners(t)));
+        lay_out(&corners, &primitives, &binary, triangles.len())
+    }
 }
 
-/// [`Bvh::from_tree`].
-pub(super) fn from_tree(positions: &[Vec3], triangles: &[[u32; 3]], tree: &Tree) -> Bvh {
-    let corners = |triangle: u32| triangles[triangle as usize].map(|i| positions[i as usize]);
-    let (primitives, binary) = binary::from_tree(tree, &|t| Primitive::of(t, corners(t)));
-    lay_out(&corners, &primitives, &binary, triangles.len())
+/// A node of a [`Tree`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TreeNode {
+    /// Lower corner of the bounding box.
+    pub low: Vec3,
+    /// Upper corner of the bounding box.
+    pub high: Vec3,
+    /// Leaf: index of its first triangle in [`Tree::order`]. Inner node: index of its first child; the second follows.
+    pub first: u32,
+    /// Number of triangles; 0 for inner nodes.
+    pub count: u32,
+}
+
+/// A binary hierarchy over triangles, to exchange with the graphics card and with other builders. The first node is the root; without
+/// triangles there are no nodes.
+#[derive(Debug, Clone, Default)]
+pub struct Tree {
+    /// The nodes, children after parents.
+    pub nodes: Vec<TreeNode>,
+    /// Triangles in the order of the leaves.
+    pub order: Vec<u32>,
 }
 
 impl Tree {
@@ -54,6 +78,22 @@ impl Tree {
             pending.push((first, children[0]));
         }
         tree
+    }
+
+    /// Number of inner nodes above the deepest leaf: the maximum number of stack entries of a traversal.
+    pub fn depth(&self) -> u32 {
+        let mut deepest = 0;
+        let mut open = vec![(0, 0)];
+        while let Some((index, above)) = open.pop() {
+            let Some(node) = self.nodes.get(index as usize) else {
+                continue;
+            };
+            deepest = deepest.max(above);
+            if node.count == 0 {
+                open.extend([node.first, node.first + 1].map(|child| (child, above + 1)));
+            }
+        }
+        deepest
     }
 }
 
@@ -103,7 +143,6 @@ fn lay_out<C: Fn(u32) -> [Vec3; 3] + Sync>(
     }
 }
 
-/// The input of the layout.
 struct Layout<'a, C> {
     corners: &'a C,
     primitives: &'a [Primitive],
@@ -147,10 +186,8 @@ impl<C: Fn(u32) -> [Vec3; 3] + Sync> Layout<'_, C> {
         tree.nodes.push(Node::empty());
         let children = self.children(root);
         let stacked = children.len() - 1;
-        let parts: Vec<Subtree> = children
-            .par_iter()
-            .map(|&child| self.subtree(child))
-            .collect();
+        let parts = children.par_iter().map(|&child| self.subtree(child));
+        let parts: Vec<Subtree> = parts.collect();
         for (lane, (child, part)) in children.into_iter().zip(parts).enumerate() {
             tree.stack = tree.stack.max(stacked + part.stack);
             let reference = tree.append(part);

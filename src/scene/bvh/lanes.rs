@@ -2,8 +2,7 @@
 
 /// `N` f32 lanes. `min` and `max` return the second operand where either is NaN; comparisons are then false.
 ///
-/// All methods are `#[inline(always)]`: code that is not inlined into the function with `#[target_feature]` is compiled without
-/// those instructions.
+/// All methods are `#[inline(always)]`: what is not inlined into a function with `#[target_feature]` lacks its instructions.
 pub(super) trait Lanes<const N: usize>: Copy {
     fn splat(x: f32) -> Self;
     /// Floats from their bits.
@@ -19,8 +18,7 @@ pub(super) trait Lanes<const N: usize>: Copy {
     fn le(self, other: Self) -> u32;
     /// Bit i is set where lane i of `self` < lane i of `other`.
     fn lt(self, other: Self) -> u32;
-    /// Compacts the entries whose mask bits are set, in order, into `packed` (at least N long); the rest of its first N entries is
-    /// undefined.
+    /// Compacts the entries whose mask bits are set, in order, into `packed` (at least N long); the rest of these N is undefined.
     fn pack(entries: &[u32; N], mask: u32, packed: &mut [u32]);
 }
 

@@ -8,24 +8,18 @@
     reason = "code for wider instruction sets is entered only after these were detected; every block says why it is sound"
 )]
 
-mod any;
 mod binary;
 mod build;
 mod lanes;
-mod nearest;
 mod pages;
-mod shear;
-mod slabs;
+mod ray;
 mod split;
 mod traverse;
-mod tree;
 
-use crate::scene::geometry::{Hit, Ray};
-use glam::Vec3;
 use pages::Pages;
 use std::hint::select_unpredictable;
 
-pub use tree::{Tree, TreeNode};
+pub use build::{Tree, TreeNode};
 
 /// Children per node.
 const WIDTH: usize = 8;
@@ -33,8 +27,7 @@ const WIDTH: usize = 8;
 /// Triangles per group.
 const GROUP: usize = 4;
 
-/// Eight child boxes and children, by descending number of triangles, as bits. Rows: min x, max x, min y, max y, min z, max z,
-/// children, unused.
+/// Eight child boxes and children, by descending number of triangles, as bits. Rows: min and max of x, y and z, children, unused.
 ///
 /// Four cache lines. With eight rows, a masked row index needs no bounds check.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -152,27 +145,12 @@ pub struct Bvh {
 
 impl std::fmt::Debug for Bvh {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(
-            f,
-            "Bvh({} triangles, {} nodes)",
-            self.triangles,
-            self.nodes.len()
-        )
+        let (triangles, nodes) = (self.triangles, self.nodes.len());
+        write!(f, "Bvh({triangles} triangles, {nodes} nodes)")
     }
 }
 
 impl Bvh {
-    /// Builds the hierarchy of a mesh. Triangles with non-finite corners are never hit.
-    pub fn new(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
-        build::build(positions, triangles)
-    }
-
-    /// The hierarchy of a mesh from another builder's binary tree, with leaves merged and nodes collapsed at minimum cost. A
-    /// triangle may be in several leaves.
-    pub fn from_tree(positions: &[Vec3], triangles: &[[u32; 3]], tree: &Tree) -> Self {
-        build::from_tree(positions, triangles, tree)
-    }
-
     /// Sets the instruction set of traversals; falls back to portable if the processor lacks it.
     #[must_use]
     pub fn with_instructions(mut self, instructions: InstructionSet) -> Self {
@@ -182,18 +160,6 @@ impl Bvh {
             InstructionSet::Portable
         };
         self
-    }
-
-    /// The nearest hit with t in (t_min, t_max).
-    #[inline]
-    pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        traverse::intersect(self, ray)
-    }
-
-    /// Whether there is any hit with t in (t_min, t_max).
-    #[inline]
-    pub fn occluded(&self, ray: &Ray) -> bool {
-        traverse::occluded(self, ray)
     }
 }
 

@@ -16,7 +16,6 @@ pub(super) enum Pages<T> {
 }
 
 impl<T: Pod> Pages<T> {
-    /// Takes over a vector's items.
     pub fn new(items: Vec<T>) -> Self {
         let length = size_of_val(items.as_slice());
         if length < PAGE {

@@ -1,7 +1,7 @@
 //! Splits a set of boxes in two by the binned surface area heuristic (Wald 2007).
 
 use crate::scene::bvh::GROUP;
-use glam::{UVec3, Vec3, Vec3A};
+use glam::{Vec3, Vec3A};
 
 /// A triangle's bounding box.
 #[derive(Clone, Copy)]
@@ -60,22 +60,7 @@ impl Bounds {
     }
 }
 
-/// Bins per axis.
 const BINS: usize = 16;
-
-/// The map from box centres to bins on each axis.
-struct Binning {
-    low: Vec3A,
-    scale: Vec3A,
-}
-
-impl Binning {
-    #[inline(always)]
-    fn bins(&self, primitive: &Primitive) -> UVec3 {
-        let bin = (primitive.center() - self.low) * self.scale;
-        bin.min(Vec3A::splat(BINS as f32 - 1.0)).as_uvec3()
-    }
-}
 
 #[derive(Clone, Copy)]
 struct Bin {
@@ -113,12 +98,13 @@ pub(super) fn split(primitives: &mut [Primitive]) -> usize {
         });
     // Bin boxes by their centres; an axis without extent has one bin.
     let size = high - low;
-    let binning = Binning {
-        low,
-        scale: Vec3A::from_array(size.to_array().map(|s| {
-            let scale = BINS as f32 * (1.0 - 1e-6) / s;
-            if scale.is_finite() { scale } else { 0.0 }
-        })),
+    let scale = Vec3A::from_array(size.to_array().map(|s| {
+        let scale = BINS as f32 * (1.0 - 1e-6) / s;
+        if scale.is_finite() { scale } else { 0.0 }
+    }));
+    let bins_of = |primitive: &Primitive| {
+        let bin = (primitive.center() - low) * scale;
+        bin.min(Vec3A::splat(BINS as f32 - 1.0)).as_uvec3()
     };
     let mut bins = [[Bin::EMPTY; BINS]; 3];
     for primitive in primitives.iter() {
@@ -126,7 +112,7 @@ pub(super) fn split(primitives: &mut [Primitive]) -> usize {
             bounds: primitive.bounds,
             count: 1,
         };
-        let [x, y, z] = binning.bins(primitive).to_array();
+        let [x, y, z] = bins_of(primitive).to_array();
         for (axis, bin) in [x, y, z].into_iter().enumerate() {
             let bin = &mut bins[axis][bin as usize & (BINS - 1)];
             *bin = bin.join(&one);
@@ -158,7 +144,7 @@ pub(super) fn split(primitives: &mut [Primitive]) -> usize {
     }
     let mut middle = 0;
     for index in 0..primitives.len() {
-        if binning.bins(&primitives[index])[axis] < bin as u32 {
+        if bins_of(&primitives[index])[axis] < bin as u32 {
             primitives.swap(middle, index);
             middle += 1;
         }

@@ -85,10 +85,7 @@ fn frame(
     let [a, b] = [0, 1].map(|half| {
         let key = (results.settings.seed.wrapping_add(half), index as u64);
         let film = shown.renders.film(camera, &options, key, samples / 2);
-        Picture {
-            pixels: film.mean(),
-            ..photograph.clone()
-        }
+        film.picture()
     });
     let halves = a.pixels.iter().zip(&b.pixels);
     let mut render = Picture {

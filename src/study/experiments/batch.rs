@@ -10,11 +10,9 @@ use crate::study::experiments::course::{
 use crate::study::experiments::courses::{
     self, Kind, LOSS, Over, RAYS, SECONDS, Spread, common_mark, comparison, plot, table, words,
 };
-use crate::study::experiments::findings::{Findings, Summary};
-use crate::study::experiments::study::{Bench, Study};
+use crate::study::experiments::study::{Bench, Findings, Study, Summary};
 use std::borrow::Cow;
 
-/// The study.
 pub const STUDY: Study = Study {
     name: "batch",
     question: "The paper: at equal time too small a batch is noisy, too large a one wastes rays; 8 pixels are a good start.",

@@ -1,7 +1,7 @@
 //! Study: the number of bounces of the fit.
 
 use crate::error::Result;
-use crate::export::plot::{Axis, Plot, Series};
+use crate::export::plot::{Axis, Plot};
 use crate::inverse::settings::Settings;
 use crate::room::Room;
 use crate::room::photographs::Rendering;
@@ -10,14 +10,12 @@ use crate::study::experiments::course::{
     CACHE_WITHOUT, Evaluator, cache_settings, cached, descend, paper_settings, rays_at,
 };
 use crate::study::experiments::courses::{
-    ALBEDO, Kind, Quantity, RAYS, Shown, Spread, common_mark, comparison, plot, table, words,
+    ALBEDO, Kind, Quantity, RAYS, Shown, Spread, common_mark, comparison, curve, plot, table, words,
 };
-use crate::study::experiments::findings::{Findings, Summary};
-use crate::study::experiments::study::{Bench, Study};
-use crate::study::experiments::twin::{Sizes, twin};
+use crate::study::experiments::study::{Bench, Findings, Study, Summary};
+use crate::study::experiments::twin::twin;
 use crate::study::subject::Subject;
 
-/// The study.
 pub const STUDY: Study = Study {
     name: "bounces",
     question: "The paper, fitting photographs of many bounces: one bounce is fast but stays wrong, two are the balance, \
@@ -68,7 +66,7 @@ fn run(bench: &Bench) -> Result<Findings> {
         true => (QUICK_ALBEDOS, QUICK_DEPTHS),
         false => (ALBEDOS, DEPTHS),
     };
-    let twin = twin(bench, Sizes::small(bench.quick))?;
+    let twin = twin(bench)?;
     let how = match &twin {
         Some(twin) => twin.words.clone(),
         None => "A box room of 2 m with seven reflectors of the mean albedo named, photographed with all bounces".to_owned(),
@@ -162,29 +160,21 @@ fn word(bounces: u64) -> String {
 
 /// Error at the transport cache's end over the depth of its fit, one curve a room.
 fn over_depth(scenes: &[TestRoom], (label, quantity): Shown) -> Plot {
-    let curve = |scene: &TestRoom| {
-        let mut series = Series {
-            name: scene.name.clone(),
-            ..Series::default()
-        };
-        for (depth, kind) in &scene.cache {
-            if let Some(spread) = kind.at_end(quantity) {
-                let x = if *depth == 0 {
-                    CHOSEN_AT
-                } else {
-                    *depth as f64
-                };
-                series.points.push([x, spread.mean]);
-                series.band.push(spread.band());
-            }
-        }
-        series
+    let of_room = |scene: &TestRoom| {
+        let means = scene.cache.iter().filter_map(|(depth, kind)| {
+            let x = match depth {
+                0 => CHOSEN_AT,
+                depth => *depth as f64,
+            };
+            Some((x, kind.at_end(quantity)?))
+        });
+        curve(&scene.name, means)
     };
     Plot {
         title: "Bounces of the fit, transport cache".to_owned(),
         x: Axis::logarithmic("bounces of the fit"),
         y: Axis::logarithmic(label),
-        series: scenes.iter().map(curve).collect(),
+        series: scenes.iter().map(of_room).collect(),
         marks: vec![(CHOSEN_AT, "adaptive".to_owned())],
         ..Plot::default()
     }

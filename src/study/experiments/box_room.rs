@@ -19,7 +19,6 @@ pub const LAMP: f64 = 0.25;
 pub const PHOTOGRAPH_SEED: u64 = 0x626f_7865_7300;
 /// Radiance times squared half side of the lamp, so that all lamps emit the same power.
 const LAMP_POWER: f64 = 0.2;
-/// Colour of the lamp.
 const LAMP_TINT: Vec3 = Vec3::new(1.0, 0.9, 0.75);
 /// Deviations of the seven reflectors' albedos from the mean, relative to the largest; their sum is zero.
 const DEVIATIONS: [f64; 7] = [-1.0, 0.6, -0.3, 0.0, 0.3, -0.6, 1.0];
@@ -89,7 +88,6 @@ pub fn furnished(
         materials.push(Material::diffuse(color(materials.len()), Vec3::ZERO));
     }
 
-    // The object and the lamp.
     modeller.object(object);
     shapes(&mut modeller);
     materials.push(Material::diffuse(color(materials.len()), Vec3::ZERO));
@@ -138,15 +136,9 @@ pub fn photographed(quick: bool) -> Result<Subject> {
 
 /// Settings of these rooms' photographs; smaller and noisier if `quick`.
 pub fn rendering(quick: bool) -> Rendering {
-    let (size, samples) = if quick {
-        ([32, 24], 32)
-    } else {
-        ([64, 48], 128)
-    };
-    Rendering {
-        seed: PHOTOGRAPH_SEED,
-        samples,
-        size,
+    match quick {
+        true => Rendering::new(PHOTOGRAPH_SEED, 32, [32, 24]),
+        false => Rendering::new(PHOTOGRAPH_SEED, 128, [64, 48]),
     }
 }
 

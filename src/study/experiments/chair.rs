@@ -1,7 +1,24 @@
 //! A small chair that shadows itself.
 
+use crate::compose::object::ObjectModel;
+use crate::error::Result;
 use crate::room::shape::Modeller;
-use glam::DVec3;
+use crate::transport::material::Material;
+use glam::{DAffine3, DVec3, Vec3};
+use std::sync::Arc;
+
+/// The chair as an object of one colour, placed by `stand`; fails if a coordinate is not finite.
+pub fn chair_model(name: &str, stand: DAffine3, color: Vec3) -> Result<Arc<ObjectModel>> {
+    let mut modeller = Modeller::default();
+    modeller.object(name);
+    modeller.placed(stand, chair);
+    let mesh = modeller.mesh;
+    let corners = (mesh.triangles.iter())
+        .map(|corners| corners.map(|i| mesh.positions[i as usize]))
+        .collect();
+    let material = Material::diffuse(color, Vec3::ZERO);
+    ObjectModel::from_corners(name, corners, material).map(Arc::new)
+}
 
 /// A chair 0.85 m high, standing on y = 0 at the origin and facing +z: a seat on four legs, with a back of three slats.
 pub fn chair(m: &mut Modeller) {

@@ -40,10 +40,8 @@ struct Facet {
 /// Only valid for a room of one convex object and lamps of albedo zero, none of which occludes another.
 pub fn photographs(room: &Room, size: [u32; 2]) -> Vec<Photograph> {
     let facets = facets(room);
-    let lamps: Vec<&Facet> = facets
-        .iter()
-        .filter(|f| f.emission != DVec3::ZERO)
-        .collect();
+    let emits = |facet: &&Facet| facet.emission != DVec3::ZERO;
+    let lamps: Vec<&Facet> = facets.iter().filter(emits).collect();
     cameras(&room.views, size)
         .iter()
         .map(|(lens, pose)| {

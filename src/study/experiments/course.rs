@@ -1,5 +1,4 @@
-//! Courses of solves that studies compare: the paper's descent, measured at fixed numbers of rays, and the end of the transport
-//! cache.
+//! Courses of solves that studies compare: the paper's descent, at fixed numbers of rays, and the end of the transport cache.
 
 use crate::error::Result;
 use crate::inverse::estimate::{Estimate, ObjectEstimate};
@@ -30,17 +29,13 @@ const PATIENCE: Duration = Duration::from_secs(600);
 pub struct Mark {
     /// Number of the last mark passed, the same for all solves. `None` before the first.
     pub index: Option<u32>,
-    /// Rays cast by the solve.
     pub rays: u64,
     /// Seconds of solving, without measurements.
     pub seconds: f64,
-    /// Optimiser steps.
     pub steps: u64,
-    /// Errors of the estimate.
     pub errors: Errors,
 }
 
-/// Errors of an estimate.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Errors {
     /// Mean absolute difference in radiance on held-out pixels.
@@ -55,9 +50,7 @@ pub struct Errors {
 
 /// Measures estimates of a subject, always on the same pixels.
 pub struct Evaluator<'a> {
-    /// What is solved.
     pub subject: &'a Subject,
-    /// Measures the loss.
     pub probe: LossProbe,
     /// The object whose error is told by itself.
     pub watched: Option<&'a str>,
@@ -78,7 +71,6 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    /// Measures an estimate.
     pub fn errors(&self, estimate: &Estimate) -> Errors {
         let known =
             (self.subject.truth()).map(|truth| truth.errors(&self.subject.problem.scene, estimate));
@@ -118,7 +110,6 @@ pub fn descend_by(
     let (mut rays, mut steps, mut seconds) = (0, 0, 0.0);
     let mut marks = Vec::new();
     loop {
-        // Step up to the next mark.
         let goal = rays_at(mark_at(rays).map_or(0, |mark| mark + 1)).min(limits.rays);
         let begun = Instant::now();
         let mut over = false;
@@ -131,7 +122,6 @@ pub fn descend_by(
         }
         seconds += begun.elapsed().as_secs_f64();
 
-        // Measure.
         marks.push(Mark {
             index: mark_at(rays),
             rays,
@@ -172,10 +162,7 @@ pub fn estimate(descent: &Descent) -> Estimate {
     }
 }
 
-/// Solves with the transport cache and measures its end.
-///
-/// # Errors
-/// The solver cannot start, or the study is stopped.
+/// Solves with the transport cache and measures its end; fails as [`solved`].
 pub fn cached(bench: &Bench, gauge: &Evaluator, settings: &Settings) -> Result<Mark> {
     let solution = solved(bench, gauge.subject, settings)?;
     Ok(Mark {
@@ -199,13 +186,8 @@ pub fn solved(bench: &Bench, subject: &Subject, settings: &Settings) -> Result<S
         weight: 1.0,
     };
     let deadline = Instant::now() + PATIENCE;
-    let (_, solution) = watch(
-        &subject.problem,
-        &subject.metric,
-        &run,
-        deadline,
-        bench.stopped,
-    )?;
+    let (problem, metric) = (&subject.problem, &subject.metric);
+    let (_, solution) = watch(problem, metric, &run, deadline, bench.stopped)?;
     bench.go_on()?;
     Ok(solution)
 }
@@ -232,7 +214,6 @@ pub fn cache_settings(seed: u64, quick: bool) -> Settings {
     }
 }
 
-/// The paper's settings in studies.
 pub fn paper_settings(seed: u64) -> Settings {
     Settings {
         preset: Preset::Paper,

@@ -5,13 +5,11 @@ use crate::export::plot::{Axis, Draw, Plot, Series};
 use crate::export::table::Table;
 use crate::math::stats::Moments;
 use crate::study::experiments::course::{Errors, Mark};
-use crate::study::experiments::findings::brief;
-use crate::study::experiments::study::Bench;
+use crate::study::experiments::study::{Bench, brief};
 
 /// Courses of one kind of solve, one for each seed.
 #[derive(Debug, Clone)]
 pub struct Kind {
-    /// Its name.
     pub name: String,
     /// One course for each seed, in order of seeds from 1.
     pub courses: Vec<Vec<Mark>>,
@@ -24,25 +22,19 @@ pub struct Spread {
     pub mean: f64,
     /// Standard deviation between seeds, as a factor.
     pub factor: f64,
-    /// Number of seeds.
     pub count: u64,
 }
 
-/// Selects an error.
 pub type Quantity = fn(&Errors) -> Option<f64>;
 
 /// Label of a plot's horizontal axis, and what it shows of a mark.
 pub type Over = (&'static str, fn(&Mark) -> f64);
-/// Rays cast by the solve.
 pub const RAYS: Over = ("rays", |mark| mark.rays as f64);
-/// Seconds of solving.
 pub const SECONDS: Over = ("seconds", |mark| mark.seconds);
 
 /// Label of a plot's vertical axis, and the error that it shows.
 pub type Shown = (&'static str, Quantity);
-/// The loss on held-out pixels.
 pub const LOSS: Shown = ("held-out l1 loss, radiance", |errors| errors.loss);
-/// The error of albedo.
 pub const ALBEDO: Shown = ("mean absolute error of albedo", |errors| errors.albedo);
 
 impl Spread {
@@ -97,10 +89,7 @@ pub fn words(spread: Option<Spread>) -> String {
     spread.map_or("-".to_owned(), |spread| spread.words())
 }
 
-/// Runs a course of each kind and seed in turn, and shows the plot so far after each.
-///
-/// # Errors
-/// The study is stopped.
+/// Runs a course of each kind and seed in turn, and shows the plot so far after each. Fails if the study is stopped.
 pub fn run(
     bench: &Bench,
     names: impl IntoIterator<Item = String>,
@@ -157,22 +146,28 @@ impl Kind {
     /// Mean error and spread at the marks, over `x`.
     fn series(&self, x: fn(&Mark) -> f64, quantity: Quantity) -> Series {
         let last = self.courses.iter().filter_map(|c| c.last()?.index).max();
-        let mut series = Series {
-            name: self.name.clone(),
-            ..Series::default()
-        };
-        for index in 0..=last.unwrap_or(0) {
+        let means = (0..=last.unwrap_or(0)).filter_map(|index| {
             let here: Vec<&Mark> = (self.courses.iter())
                 .filter_map(|course| course.iter().find(|m| m.index == Some(index)))
                 .collect();
-            let errors = here.iter().filter_map(|mark| quantity(&mark.errors));
-            if let Some(spread) = Spread::over(errors) {
-                let place = here.iter().map(|mark| x(mark)).sum::<f64>() / here.len() as f64;
-                series.points.push([place, spread.mean]);
-                series.band.push(spread.band());
-            }
-        }
-        series
+            let spread = Spread::over(here.iter().filter_map(|mark| quantity(&mark.errors)))?;
+            let place = here.iter().map(|mark| x(mark)).sum::<f64>() / here.len() as f64;
+            Some((place, spread))
+        });
+        curve(&self.name, means)
+    }
+}
+
+/// A curve of means, with their deviations between seeds as its band.
+pub fn curve(name: &str, means: impl Iterator<Item = (f64, Spread)>) -> Series {
+    let (points, band) = means
+        .map(|(x, spread)| ([x, spread.mean], spread.band()))
+        .unzip();
+    Series {
+        name: name.to_owned(),
+        points,
+        band,
+        ..Series::default()
     }
 }
 

@@ -9,15 +9,13 @@ use crate::math::stats::{Moments, weighted_median};
 use crate::room::photographs::Rendering;
 use crate::scene::visibility::NOTHING;
 use crate::study::experiments::box_room;
-use crate::study::experiments::findings::{Findings, Summary, brief};
-use crate::study::experiments::study::{Bench, Study};
+use crate::study::experiments::study::{Bench, Findings, Study, Summary, brief};
 use crate::study::experiments::twin::studied;
 use crate::transport::lit::LitScene;
 use crate::transport::path::{PathOptions, radiance};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// The study.
 pub const STUDY: Study = Study {
     name: "estimators",
     question: "The paper takes colour and derivative of an l1 loss from independent samples. Is the fit then free of bias, \
@@ -39,18 +37,14 @@ const SMALL: f64 = 0.01;
 /// Fits the light's scale to pixels.
 type Estimator = fn(&[Pixel]) -> f64;
 
-/// Name and function of each estimator.
 const ESTIMATORS: [(&str, Estimator); 4] = [
     ("l1, same samples", |pixels| l1(pixels, |p| p.render[0])),
     ("l1, independent samples", |pixels| {
         l1(pixels, |p| p.render[1])
     }),
     ("l2, same samples", |pixels| {
-        ratio(
-            pixels,
-            |p| p.render[0] * p.photograph,
-            |p| p.render[0] * p.render[0],
-        )
+        let over = |p: &Pixel| p.render[0] * p.photograph;
+        ratio(pixels, over, |p| p.render[0] * p.render[0])
     }),
     ("l2, two sets", |pixels| {
         let both = |p: &Pixel| 0.5 * (p.render[0] + p.render[1]) * p.photograph;
@@ -80,7 +74,6 @@ impl Fits {
         scales.filter(|scale| scale.is_finite()).collect()
     }
 
-    /// The mean as text.
     fn value(&self, estimator: usize) -> String {
         let (fits, seeds) = (self.mean(estimator), self.scales.len() as u64);
         match fits.count {
@@ -179,8 +172,8 @@ fn run(bench: &Bench) -> Result<Findings> {
     })
 }
 
-/// Luminance of the pixels of all cameras that see no lamp, in order; if they are too many, of an evenly spread
-/// subset. The random numbers are keyed by seed and set.
+/// Luminance of the pixels of all cameras that see no lamp, in order; of an evenly spread subset of too many. Keyed by seed and
+/// set.
 fn render(lit: &LitScene, options: &PathOptions, [seed, set]: [u64; 2], samples: u32) -> Vec<f64> {
     let scene = &lit.scene;
     let is_lamp = |object: u32| lit.materials[object as usize].emission.max_element() > 0.0;
@@ -239,15 +232,11 @@ fn l1(pixels: &[Pixel], weight: impl Fn(&Pixel) -> f64) -> f64 {
     weighted_median(roots).unwrap_or(f64::NAN)
 }
 
-/// Expected l2 fit with the same samples: Σ x² / Σ (x² + σ²), where the variance σ² of a render is estimated from the
-/// difference of the two.
+/// Expected l2 fit with the same samples: Σ x² / Σ (x² + σ²), the variance σ² of a render from the difference of the two.
 fn same_samples_predicted(pixels: &[Pixel]) -> f64 {
     let noise = |p: &Pixel| 0.5 * (p.render[0] - p.render[1]).powi(2);
-    ratio(
-        pixels,
-        |p| p.photograph.powi(2),
-        |p| p.photograph.powi(2) + noise(p),
-    )
+    let square = |p: &Pixel| p.photograph.powi(2);
+    ratio(pixels, square, |p| square(p) + noise(p))
 }
 
 fn plot(name: &str, fits: &[Fits]) -> Plot {

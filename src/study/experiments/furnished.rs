@@ -2,13 +2,12 @@
 
 use crate::capture::photograph::Photograph;
 use crate::compose::object::ObjectModel;
-use crate::compose::placement::Placement;
 use crate::error::{Error, Result};
 use crate::room::Room;
 use crate::room::photographs::{Rendering, STORED, render, stored};
 use crate::room::shape::Modeller;
 use crate::scene::visibility::NOTHING;
-use crate::study::experiments::chair::chair;
+use crate::study::experiments::chair::{chair, chair_model};
 use crate::study::experiments::standing::{Cylinder, places, up, upright};
 use crate::study::experiments::twin::Studied;
 use crate::study::subject::Subject;
@@ -41,41 +40,26 @@ const MAX_COVERED: f64 = 0.4;
 /// Gap between floor and chair, relative to its height, for floors that are not quite flat.
 const LIFT: f64 = 2e-3;
 /// Photographs of the room without textures; those of the textured one are stored in the program.
-const PLAIN: Rendering = Rendering {
-    samples: 64,
-    size: [320, 240],
-    ..STORED
-};
-const QUICK: Rendering = Rendering {
-    seed: 7,
-    samples: 32,
-    size: [40, 30],
-};
+const PLAIN: Rendering = Rendering::new(STORED.seed, 64, [320, 240]);
+const QUICK: Rendering = Rendering::new(7, 32, [40, 30]);
 
 /// A room with and without objects.
 pub struct Furnished {
-    /// In words.
     pub name: String,
     /// Sentence on the room and the positions of the chairs.
     pub how: String,
     /// The room without the chairs, with photographs.
     pub subject: Subject,
-    /// Its true light.
     pub lit: LitScene,
     /// The room with the chairs in its mesh.
     pub furnished: LitScene,
     /// The chairs in the room's coordinates.
     pub models: Vec<Arc<ObjectModel>>,
-    /// Their placement: as modelled.
-    pub placement: Placement,
     /// The frames that they are inserted into.
     pub frames: Vec<usize>,
 }
 
 /// The built-in room with two chairs; its textures are replaced by their means unless `textured`.
-///
-/// # Errors
-/// The program file is damaged.
 pub fn built_in(textured: bool, quick: bool) -> Result<Furnished> {
     let mut room = Room::new();
     if !textured {
@@ -189,15 +173,11 @@ fn furnish(
     };
     let mut models = Vec::new();
     for ((name, color, ..), stand) in CHAIRS.into_iter().zip(stands) {
-        let first = modeller.mesh.triangles.len();
+        let color = Vec3::from(color);
         modeller.object(name);
         modeller.placed(stand, chair);
-        let corners = modeller.mesh.triangles[first..].iter();
-        let corners = corners.map(|corners| corners.map(|i| modeller.mesh.positions[i as usize]));
-        let material = Material::diffuse(color.into(), Vec3::ZERO);
-        room.materials.push(material.clone());
-        let model = ObjectModel::from_corners(name, corners.collect(), material)?;
-        models.push(Arc::new(model));
+        room.materials.push(Material::diffuse(color, Vec3::ZERO));
+        models.push(chair_model(name, stand, color)?);
     }
     room.mesh = modeller.mesh;
     if !is_textured {
@@ -211,7 +191,6 @@ fn furnish(
         lit,
         furnished: room.lit(size)?,
         models,
-        placement: Placement::new("chairs", None),
     })
 }
 

@@ -5,7 +5,7 @@ use crate::compose::backdrop::Backdrop;
 use crate::compose::denoise::denoised;
 use crate::compose::insert::{Insertion, Layers};
 use crate::compose::naive::{Pasted, harmonics_of_estimate, harmonics_of_photographs};
-use crate::compose::placement::PlacedObject;
+use crate::compose::placement::{PlacedObject, Placement};
 use crate::error::Result;
 use crate::export::picture::percentile_exposure;
 use crate::export::plot::{Axis, Plot, Series};
@@ -14,18 +14,16 @@ use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::math::picture::Picture;
 use crate::study::experiments::course::{CACHE_WITHOUT, cache_settings, paper_settings, solved};
-use crate::study::experiments::findings::{Findings, Grid, Summary, brief};
 use crate::study::experiments::furnished::{Furnished, built_in, of_twin};
 use crate::study::experiments::likeness::Likeness;
-use crate::study::experiments::study::{Bench, Limits, Study};
-use crate::study::experiments::twin::{Sizes, twin};
+use crate::study::experiments::study::{Bench, Findings, Grid, Study, Summary, brief};
+use crate::study::experiments::twin::twin_of_size;
 use crate::transport::denoise::Denoiser;
 use crate::transport::film::Film;
 use crate::transport::lit::LitScene;
 use crate::transport::path::PathOptions;
 use std::sync::Arc;
 
-/// The study.
 pub const STUDY: Study = Study {
     name: "insertion",
     question: "The paper: objects composited with the light found are consistent with the photograph, naive ones are not. By \
@@ -34,7 +32,6 @@ pub const STUDY: Study = Study {
     run,
 };
 
-/// Random seed of the true renderings.
 const TRUTH_SEED: u64 = 0x7472_7574;
 /// Shadow and bleed are the pixels beside the objects that change by more than this fraction.
 const CHANGED: f32 = 0.05;
@@ -45,7 +42,6 @@ const WAYS: [&str; 5] = [
     "ours, the paper's descent",
     "ours, true light",
 ];
-/// Short titles of the pictures.
 const TITLES: [&str; 4] = ["truth", "naive, photographs", "naive, estimate", "ours"];
 const PLACES: [&str; 2] = ["objects", "shadow and bleed"];
 
@@ -59,13 +55,16 @@ struct Scene {
 }
 
 fn run(bench: &Bench) -> Result<Findings> {
-    let limits = bench.limits(4);
-    let sizes = Sizes {
-        long_side: if bench.quick { 40 } else { 160 },
-        paths: if bench.quick { 1_000_000 } else { 20_000_000 },
+    // Time of the paper's descent in each room, in seconds.
+    let time = match bench.limits(4).seconds {
+        seconds if seconds.is_finite() => seconds,
+        _ => 2.0,
     };
-    let twin = twin(bench, sizes)?;
-    let rooms = match twin {
+    let (long_side, paths) = match bench.quick {
+        true => (40, 1_000_000),
+        false => (160, 20_000_000),
+    };
+    let rooms = match twin_of_size(bench, long_side, paths)? {
         Some(twin) => vec![(of_twin(twin)?, false, "-twin")],
         None => vec![
             (built_in(true, bench.quick)?, true, "-textured"),
@@ -76,7 +75,6 @@ fn run(bench: &Bench) -> Result<Findings> {
     for (room, textured, file) in rooms {
         bench.begin(&room.name)?;
         how += &format!("{} Photographs {:?}. ", room.how, room.frames);
-        let time = seconds_of_paper(limits);
         let cache = Settings {
             textures: textured && !bench.quick,
             ..cache_settings(1, bench.quick)
@@ -103,26 +101,15 @@ fn run(bench: &Bench) -> Result<Findings> {
                 true => "",
                 false => " (but for textures in the textured room)",
             },
-            brief(seconds_of_paper(limits)),
+            brief(time),
             CHANGED * 100.0,
         ),
         tables: vec![("", table(&scenes))],
         plots: vec![("", plot(&scenes))],
         summary: summary(&scenes),
         seen: scenes.iter().flat_map(seen).collect(),
-        pictures: scenes
-            .into_iter()
-            .map(|scene| (scene.file, scene.grid))
-            .collect(),
+        pictures: scenes.into_iter().map(|s| (s.file, s.grid)).collect(),
     })
-}
-
-/// Time of the paper's descent in each room, in seconds.
-fn seconds_of_paper(limits: Limits) -> f64 {
-    match limits.seconds.is_finite() {
-        true => limits.seconds,
-        false => 2.0,
-    }
 }
 
 /// Composites by every method in all frames, compared with the truth.
@@ -137,8 +124,9 @@ fn scene(
     let (truth_samples, samples) = if quick { (128, 32) } else { (512, 64) };
     let problem = &room.subject.problem;
     let scene = &problem.scene;
+    let as_modelled = Placement::new("chairs", None);
     let objects = (room.models.iter())
-        .map(|model| PlacedObject::new(model.clone(), &room.placement, scene).map(Arc::new))
+        .map(|model| PlacedObject::new(model.clone(), &as_modelled, scene).map(Arc::new))
         .collect::<Result<Vec<_>>>()?;
     let pictures: Vec<Picture> = (problem.photographs.iter()).map(|p| p.picture()).collect();
     let photographed = harmonics_of_photographs(scene.cameras.iter().zip(&pictures));
@@ -154,12 +142,8 @@ fn scene(
     };
     for &frame in &room.frames {
         let camera = &scene.cameras[frame];
-        let backdrop = Backdrop::new(
-            frame,
-            camera,
-            &problem.photographs[frame],
-            Exposure::default(),
-        )?;
+        let photograph = &problem.photographs[frame];
+        let backdrop = Backdrop::new(frame, camera, photograph, Exposure::default())?;
         let composite = |lit: &Arc<LitScene>, options: PathOptions| {
             insert(lit, &backdrop, &objects, options, [1, 2], samples)
         };
@@ -189,19 +173,9 @@ fn scene(
 
         // The truth, and where it differs from the empty room.
         let mut film = Film::new(camera);
-        film.add(
-            &room.furnished,
-            camera,
-            &full,
-            TRUTH_SEED,
-            frame as u64,
-            truth_samples,
-        );
-        let truth = Picture {
-            width: film.width,
-            height: film.height,
-            pixels: film.mean(),
-        };
+        let (world, key) = (&room.furnished, frame as u64);
+        film.add(world, camera, &full, TRUTH_SEED, key, truth_samples);
+        let truth = film.picture();
         let changes = layers.delta.pixels.iter().zip(&layers.without.pixels);
         let masks = [
             layers.alpha.iter().map(|&alpha| alpha > 0.5).collect(),
@@ -282,12 +256,8 @@ fn plot(scenes: &[Scene]) -> Plot {
 
 fn summary(scenes: &[Scene]) -> Summary {
     let words = |l: &Likeness| {
-        format!(
-            "{} · {:.1} dB · {:.3}",
-            brief(l.relative()),
-            l.psnr(),
-            l.ssim()
-        )
+        let error = brief(l.relative());
+        format!("{error} · {:.1} dB · {:.3}", l.psnr(), l.ssim())
     };
     let rows = scenes.iter().flat_map(|scene| {
         (WAYS.iter().zip(&scene.likeness)).map(move |(way, [objects, shadow])| {

@@ -52,7 +52,6 @@ impl Likeness {
         self.similar / self.pixels
     }
 
-    /// Number of compared pixels.
     pub fn pixels(&self) -> f64 {
         self.pixels
     }

@@ -12,15 +12,13 @@ use crate::study::experiments::course::{
 use crate::study::experiments::courses::{
     self, Kind, LOSS, RAYS, SECONDS, Spread, common_mark, comparison, plot, table, words,
 };
-use crate::study::experiments::findings::{Findings, Summary, brief};
 use crate::study::experiments::gradient::{Noise, noise};
-use crate::study::experiments::study::{Bench, Study};
-use crate::study::experiments::twin::{Sizes, twin};
+use crate::study::experiments::study::{Bench, Findings, Study, Summary, brief};
+use crate::study::experiments::twin::twin;
 use crate::study::subject::Subject;
 use crate::transport::material::Lobe;
 use glam::Vec3;
 
-/// The study.
 pub const STUDY: Study = Study {
     name: "mis",
     question: "The paper: multiple importance sampling speeds convergence markedly. Against light sampling alone and BSDF \
@@ -29,7 +27,6 @@ pub const STUDY: Study = Study {
     run,
 };
 
-/// The study's own rooms.
 const ROOMS: [Lamp; 3] = [
     Lamp {
         name: "small lamp",
@@ -91,7 +88,6 @@ struct LitRoom {
     cache: Vec<Mark>,
 }
 
-/// Describes the study's own rooms.
 fn own_rooms() -> String {
     let [small, large, rough] = &ROOMS;
     let lobe = rough.board.map_or_else(String::new, |lobe| {
@@ -109,7 +105,7 @@ fn own_rooms() -> String {
 }
 
 fn run(bench: &Bench) -> Result<Findings> {
-    let twin = twin(bench, Sizes::small(bench.quick))?;
+    let twin = twin(bench)?;
     let how = twin
         .as_ref()
         .map_or_else(own_rooms, |twin| twin.words.clone());
@@ -161,14 +157,8 @@ fn run(bench: &Bench) -> Result<Findings> {
                 .collect::<Result<_>>()?,
         });
     }
-    let kinds: Vec<Kind> = scenes
-        .iter()
-        .flat_map(|scene| scene.kinds.clone())
-        .collect();
-    let cache: Vec<Mark> = scenes
-        .iter()
-        .flat_map(|scene| scene.cache.clone())
-        .collect();
+    let kinds: Vec<Kind> = scenes.iter().flat_map(|s| s.kinds.clone()).collect();
+    let cache: Vec<Mark> = scenes.iter().flat_map(|s| s.cache.clone()).collect();
     let mut plots = Vec::new();
     for scene in &scenes {
         let draw = |over| plot(&scene.name, over, LOSS, &scene.kinds, &scene.cache);

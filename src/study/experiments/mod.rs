@@ -11,14 +11,11 @@ mod closed_form;
 mod course;
 mod courses;
 mod estimators;
-mod evenness;
-mod findings;
 mod furnished;
 mod gradient;
 mod insertion;
 mod likeness;
 mod mis;
-mod moved;
 mod objects;
 mod precision;
 pub mod readings;
@@ -32,12 +29,10 @@ mod textures;
 mod twin;
 
 pub use crate::study::subject::Subject;
-pub use chair::chair;
-pub use findings::{Findings, Grid, Summary};
+pub(super) use chair::chair_model;
 pub(super) use insertion::insert;
-pub(super) use standing::upright;
-pub use standing::{Cylinder, places, up};
-pub use study::{Bench, Limits, Study};
+pub(super) use standing::{Cylinder, places, up, upright};
+pub use study::{Bench, Findings, Grid, Limits, Study, Summary};
 
 /// All studies, in the order of `relit study all`.
 pub const STUDIES: &[Study] = &[

@@ -20,7 +20,6 @@ use std::cmp::Reverse;
 
 /// An object to be photographed and fitted.
 pub struct Posed {
-    /// Display name.
     pub name: String,
     /// Its name in the scene.
     pub object: String,
@@ -109,11 +108,7 @@ pub fn shadowed(quick: bool) -> Result<Posed> {
         let target = DVec3::new(-0.3, 0.45, -0.25);
         room.views.push(View::towards(eye.into(), target));
     }
-    let rendering = Rendering {
-        seed: box_room::PHOTOGRAPH_SEED,
-        samples,
-        size,
-    };
+    let rendering = Rendering::new(box_room::PHOTOGRAPH_SEED, samples, size);
     let (subject, floor) = photographed(&room, &rendering, object)?;
     Ok(Posed {
         name: "self-shadowing, in a room".to_owned(),
@@ -135,10 +130,7 @@ pub fn shadowed(quick: bool) -> Result<Posed> {
     })
 }
 
-/// The most visible object of a capture's twin that is no lamp. All other objects are unknown too.
-///
-/// # Errors
-/// All objects are lamps.
+/// The most visible object of a capture's twin that is no lamp; fails if all are. All other objects are unknown too.
 pub fn of_twin(twin: &Studied) -> Result<Posed> {
     let room = &twin.room;
     let seen = seen_pixels(&room.lit(twin.rendering.size)?);
@@ -171,8 +163,7 @@ pub fn of_twin(twin: &Studied) -> Result<Posed> {
     })
 }
 
-/// Photographs a room in two independent halves. Returns their mean, and the relative error of an object's mean radiance due to
-/// their noise.
+/// Photographs a room in two independent halves: their mean, and the relative error of an object's mean radiance by their noise.
 fn photographed(room: &Room, rendering: &Rendering, object: &str) -> Result<(Subject, f64)> {
     let half = |seed| render(room, &Rendering { seed, ..*rendering });
     let halves = [half(rendering.seed)?, half(rendering.seed + 1)?];
@@ -223,11 +214,7 @@ mod tests {
             .push(View::towards(eye, DVec3::new(0.0, 0.7, 0.0)));
         let size = [32, 24];
         let exact = closed_form::photographs(&room, size);
-        let rendering = Rendering {
-            seed: 3,
-            samples: 1024,
-            size,
-        };
+        let rendering = Rendering::new(3, 1024, size);
         let rendered = render(&room, &rendering).expect("rendered");
         for (frame, (exact, rendered)) in exact.iter().zip(&rendered).enumerate() {
             let mut sums = [0.0; 2];

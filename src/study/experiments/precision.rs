@@ -4,17 +4,20 @@ use crate::error::Result;
 use crate::export::plot::{Axis, Plot, Series};
 use crate::export::table::Table;
 use crate::inverse::settings::{Preset, Settings};
+use crate::math::stats::quantile;
+use crate::room::Room;
+use crate::room::cameras::cameras;
+use crate::scene::Scene;
+use crate::scene::visibility::NOTHING;
 use crate::study::experiments::box_room;
 use crate::study::experiments::course::{cache_settings, solved};
-use crate::study::experiments::findings::{Findings, Summary, brief};
-use crate::study::experiments::moved::{self, hit_error};
-use crate::study::experiments::study::{Bench, Study};
+use crate::study::experiments::study::{Bench, Findings, Study, Summary, brief};
 use crate::study::experiments::summed::Paths;
 use crate::study::experiments::twin::studied;
 use crate::study::subject::Subject;
-use glam::Vec3;
+use crate::transport::material::Material;
+use glam::{DVec3, Vec2, Vec3};
 
-/// The study.
 pub const STUDY: Study = Study {
     name: "precision",
     question: "Rays and path weights are kept in 32 bits, sums in 64. Over sizes, distances from the origin, numbers of paths \
@@ -23,14 +26,19 @@ pub const STUDY: Study = Study {
     run,
 };
 
+/// Quantile of the reported error over rays.
+const QUANTILE: f64 = 0.99;
+
 /// Largest tolerable relative error. For a fit it is twice the difference between two seeds.
 const TOLERABLE: f64 = 1e-3;
+
+/// Changes a room by a parameter. Returns the room, and the size that errors are relative to.
+type Change = fn(&Room, f64) -> (Room, f64);
 
 /// Errors over one parameter.
 struct Line {
     axis: &'static str,
     quantity: &'static str,
-    /// Largest tolerable error.
     tolerable: f64,
     /// Parameter value and error.
     points: Vec<(f64, f64)>,
@@ -42,22 +50,22 @@ fn run(bench: &Bench) -> Result<Findings> {
         (low..=high).step_by(step).map(|k| 10f64.powi(k)).collect()
     };
     let studied = studied(bench, box_room::rendering(true))?;
-    let subject = studied.photographed()?;
+    let subject = Subject::of_room(&studied.room, &studied.rendering)?;
     let (words, room) = (studied.words, studied.room);
     let reflects: Vec<bool> = (room.materials.iter())
         .map(|material| material.emission == Vec3::ZERO)
         .collect();
     let albedos = |subject: &Subject, seed| fitted(bench, subject, &reflects, seed);
-    let met = moved::meets(&subject.problem.scene);
+    let met = meets(&subject.problem.scene);
     let noise = difference(&albedos(&subject, 2)?, &albedos(&subject, 1)?);
 
     // The room scaled, and with an ever farther outlier; fits are compared with the first value of each.
     let mut lines = Vec::new();
     let sizes: Vec<f64> = std::iter::once(1.0).chain(powers(-6, 6)).collect();
     let far: Vec<f64> = std::iter::once(1.0).chain(powers(1, 6)).collect();
-    let changed: [(&str, Vec<f64>, moved::Change); 2] = [
-        ("size of the room", sizes, moved::scaled),
-        ("distance of an outlier, in rooms", far, moved::with_outlier),
+    let changed: [(&str, Vec<f64>, Change); 2] = [
+        ("size of the room", sizes, scaled),
+        ("distance of an outlier, in rooms", far, with_outlier),
     ];
     for (axis, values, change) in changed {
         bench.begin(axis)?;
@@ -123,6 +131,80 @@ fn run(bench: &Bench) -> Result<Findings> {
     Ok(findings(&words, noise, &lines))
 }
 
+/// Longest side of a room's bounding box.
+fn size(room: &Room) -> f64 {
+    let (low, high) = room.mesh.bounds();
+    (high - low).max_element()
+}
+
+/// The room scaled by `factor`.
+fn scaled(room: &Room, factor: f64) -> (Room, f64) {
+    let mut room = room.clone();
+    room.mesh.positions.iter_mut().for_each(|p| *p *= factor);
+    (room.views.iter_mut()).for_each(|view| view.pose.center *= factor);
+    let size = size(&room);
+    (room, size)
+}
+
+/// The room with a small triangle at `distance` times its size, like a stray triangle of a scan.
+fn with_outlier(room: &Room, distance: f64) -> (Room, f64) {
+    let mut room = room.clone();
+    let size = size(&room);
+    let (low, high) = room.mesh.bounds();
+    let first = room.mesh.positions.len() as u32;
+    let middle = (low + high) * 0.5;
+    let far = middle + DVec3::new(0.6, 0.48, 0.64) * (size * distance);
+    let corners = [DVec3::ZERO, DVec3::X, DVec3::Y].map(|p| far + p * (0.1 * size));
+    room.mesh.positions.extend(corners);
+    room.mesh.triangles.push([first, first + 1, first + 2]);
+    room.mesh.object_of.push(room.mesh.objects.len() as u32);
+    room.mesh.objects.push("speck".to_owned());
+    if !room.mesh.corner_uvs.is_empty() {
+        room.mesh.corner_uvs.push([Vec2::ZERO; 3]);
+    }
+    room.materials
+        .push(Material::diffuse(Vec3::splat(0.5), Vec3::ZERO));
+    (room, size)
+}
+
+/// Whether the central ray of each pixel of each camera hits a surface.
+fn meets(scene: &Scene) -> Vec<bool> {
+    let pixels = scene.ids().triangles.iter().flatten();
+    pixels.map(|&triangle| triangle != NOTHING).collect()
+}
+
+/// Error of the hit points of the pixels' central rays in units of `size` (99 % quantile), compared in f64 with the
+/// intersection of ray and triangle plane. `met` are the pixels with a hit in the original room; one that hits
+/// nothing now has error 1.
+fn hit_error(room: &Room, scene: &Scene, met: &[bool], size: f64) -> f64 {
+    let lens = scene.cameras.first().map(|camera| camera.intrinsics);
+    let [width, height] = lens.map_or([0; 2], |lens| [lens.width, lens.height]);
+    let exact = cameras(&room.views, [width, height]);
+    let mut errors = Vec::new();
+    let mut met = met.iter();
+    for (camera, (lens, pose)) in scene.cameras.iter().zip(&exact) {
+        for pixel in 0..camera.pixels() {
+            if met.next() != Some(&true) {
+                continue;
+            }
+            let at = camera.corner(pixel) + 0.5;
+            let Some(hit) = scene.intersect(&camera.ray(at)) else {
+                errors.push(1.0);
+                continue;
+            };
+            let corners = room.mesh.triangles[hit.triangle as usize];
+            let [a, b, c] = corners.map(|i| room.mesh.positions[i as usize]);
+            let normal = (b - a).cross(c - a);
+            let on_plane = lens.normalized(at.as_dvec2());
+            let direction = pose.rotation * DVec3::new(on_plane.x, -on_plane.y, -1.0);
+            let t = (a - pose.center).dot(normal) / direction.dot(normal);
+            let found = scene.point(&hit).as_dvec3() + scene.origin;
+            errors.push((pose.center + direction * t - found).length() / size);
+        }
+    }
+    quantile(&mut errors, QUANTILE).unwrap_or(f64::NAN)
+}
+
 /// The reflectors' albedos by channel, from a quick fit.
 fn fitted(bench: &Bench, subject: &Subject, reflects: &[bool], seed: u64) -> Result<Vec<f64>> {
     let settings = Settings {
@@ -138,10 +220,8 @@ fn fitted(bench: &Bench, subject: &Subject, reflects: &[bool], seed: u64) -> Res
 
 /// Mean relative difference over positive reference values.
 fn difference(found: &[f64], wanted: &[f64]) -> f64 {
-    let both = found
-        .iter()
-        .zip(wanted)
-        .filter(|(_, wanted)| **wanted > 0.0);
+    let both = found.iter().zip(wanted);
+    let both = both.filter(|(_, wanted)| **wanted > 0.0);
     let differences: Vec<f64> = both.map(|(a, b)| (a - b).abs() / b).collect();
     differences.iter().sum::<f64>() / differences.len().max(1) as f64
 }
@@ -217,12 +297,8 @@ fn plot(lines: &[Line]) -> Plot {
 
 /// The range of parameter values with a tolerable error.
 fn reach(line: &Line) -> String {
-    let tolerable = || {
-        line.points
-            .iter()
-            .filter(|p| p.1 <= line.tolerable)
-            .map(|p| p.0)
-    };
+    let is_tolerable = |p: &&(f64, f64)| p.1 <= line.tolerable;
+    let tolerable = || line.points.iter().filter(is_tolerable).map(|p| p.0);
     match (tolerable().reduce(f64::min), tolerable().reduce(f64::max)) {
         (Some(low), Some(high)) => format!("{low:.0e} to {high:.0e}"),
         _ => "nowhere".to_owned(),

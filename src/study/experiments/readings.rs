@@ -11,8 +11,7 @@ use crate::export::table::Table;
 use crate::room;
 use crate::room::generated::Family;
 use crate::scene::Scene;
-use crate::study::experiments::findings::{Findings, Summary};
-use crate::study::experiments::study::{Bench, Study};
+use crate::study::experiments::study::{Bench, Findings, Study, Summary};
 use crate::study::trade::rooms;
 
 /// The study.
@@ -63,6 +62,7 @@ pub fn mistakes() -> Vec<Mistake> {
         ..sound
     };
     let focal = |focal| Reading { focal, ..sound };
+    let axes = |axes| Reading { axes, ..sound };
     let lies = |orientation| Reading {
         orientation,
         ..sound
@@ -93,13 +93,7 @@ pub fn mistakes() -> Vec<Mistake> {
             name: "all photographs the same",
             reading: None,
         },
-        mistake(
-            "poses with OpenCV's axes",
-            Reading {
-                axes: Axes::OpenCv,
-                ..sound
-            },
-        ),
+        mistake("poses with OpenCV's axes", axes(Axes::OpenCv)),
         mistake(
             "mesh with z up, poses with y up",
             Reading {

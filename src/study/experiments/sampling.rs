@@ -12,14 +12,13 @@ use crate::study::experiments::course::{
 use crate::study::experiments::courses::{
     self, ALBEDO, Kind, LOSS, RAYS, Shown, common_mark, comparison, plot, table, words,
 };
-use crate::study::experiments::evenness::{Evenness, measure};
-use crate::study::experiments::findings::{Findings, Summary, brief};
+use crate::study::experiments::gradient::{Evenness, evenness};
 use crate::study::experiments::selection::Groups;
-use crate::study::experiments::study::{Bench, Limits, Study};
+use crate::study::experiments::study::{Bench, Findings, Limits, Study, Summary, brief};
 use crate::study::experiments::twin::studied;
+use crate::study::subject::Subject;
 use crate::transport::path::PathOptions;
 
-/// The study.
 pub const STUDY: Study = Study {
     name: "sampling",
     question: "The paper sees \"high potential in investigating better sampling strategies\". What do pixels drawn by object or \
@@ -32,7 +31,6 @@ pub const STUDY: Study = Study {
 const UPDATE_INTERVAL: u64 = 500;
 const UNIFORM: &str = "uniform";
 
-/// How pixels are drawn.
 #[derive(Clone, Copy)]
 enum Strategy {
     Uniform,
@@ -57,7 +55,7 @@ const STRATEGIES: [(&str, Strategy); 5] = [
 fn run(bench: &Bench) -> Result<Findings> {
     let limits = bench.limits(STRATEGIES.len() * bench.seeds as usize);
     let studied = studied(bench, box_room::rendering(bench.quick))?;
-    let subject = studied.photographed()?;
+    let subject = Subject::of_room(&studied.room, &studied.rendering)?;
     let gauge = Evaluator::new(&subject, paper_settings(1).max_bounces());
     let names = STRATEGIES.iter().map(|(name, _)| (*name).to_owned());
     let course = |index: usize, seed| {
@@ -68,7 +66,7 @@ fn run(bench: &Bench) -> Result<Findings> {
     bench.begin("paths")?;
     let truth = box_room::truth(&studied.room);
     let (pixels, max) = if bench.quick { (16, 256) } else { (64, 4096) };
-    let evenness = measure(&subject.problem, &truth, pixels, max);
+    let evenness = evenness(&subject.problem, &truth, pixels, max);
 
     Ok(Findings {
         how: format!(
@@ -101,7 +99,6 @@ fn drawn(kinds: &[Kind], shown: Shown) -> Plot {
     plot("Pixels of the paper's descent", RAYS, shown, kinds, &[])
 }
 
-/// One course of the descent.
 fn descent(
     bench: &Bench,
     gauge: &Evaluator,

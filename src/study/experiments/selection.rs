@@ -23,7 +23,6 @@ const UNIFORM_FRACTION: f64 = 0.2;
 pub struct Groups {
     /// For each group, its pixels as (frame, pixel).
     pixels: Vec<Vec<(u32, u32)>>,
-    /// Probabilities of the groups.
     probabilities: Cumulative,
     total: usize,
     /// Whether gradients are weighted to be unbiased for uniform draws.
@@ -84,7 +83,6 @@ impl Groups {
         }
     }
 
-    /// Draws a pixel.
     pub fn draw(&self, stream: &mut Stream) -> Option<Drawn> {
         let at = stream.uniform_f64();
         let group = self.probabilities.index_at(at)?;
@@ -172,15 +170,11 @@ mod tests {
         }
         for ((chance, weight), pixels) in counts.iter().zip(&groups.pixels) {
             // Five standard deviations of a binomial fraction of one in eight.
-            assert!(
-                (chance - 1.0 / objects as f64).abs() < 5.0 * 0.33 / 282.0,
-                "{chance}"
-            );
+            let off = (chance - 1.0 / objects as f64).abs();
+            assert!(off < 5.0 * 0.33 / 282.0, "{chance}");
             let fraction = pixels.len() as f64 / groups.total as f64;
-            assert!(
-                (weight / fraction - 1.0).abs() < 0.05,
-                "{weight} {fraction}"
-            );
+            let ratio = weight / fraction;
+            assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
         }
     }
 }

@@ -20,12 +20,9 @@ const HEIGHTS: [f32; 3] = [0.05, 0.5, 1.0];
 /// Largest step of the floor around a place, relative to the cylinder's height.
 const STEP: f32 = 0.03;
 
-/// An upright cylinder.
 #[derive(Debug, Clone, Copy)]
 pub struct Cylinder {
-    /// Radius of its base.
     pub radius: f32,
-    /// Height from base to top.
     pub height: f32,
 }
 
@@ -87,8 +84,7 @@ fn ground(scene: &Scene, up: Vec3) -> Vec<Vec3> {
     points
 }
 
-/// Whether a place is free: no camera within the cylinder's height, no occluder on rays through the cylinder, and
-/// level floor below its rim.
+/// Whether a place is free: no camera within the cylinder's height, nothing on rays through it, and level floor below its rim.
 fn is_free(scene: &Scene, up: Vec3, cylinder: Cylinder, place: Vec3) -> bool {
     let Cylinder { radius, height } = cylinder;
     let frame = Frame::around(up);

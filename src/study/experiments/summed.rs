@@ -10,9 +10,7 @@ use crate::study::experiments::gradient::tracer;
 use crate::transport::emitters::Emitters;
 use glam::Vec3;
 
-/// Key of the paths.
 const KEY: u64 = 0x7375_6d73;
-/// Albedo of every surface.
 const ALBEDO: f32 = 0.55;
 /// Longest path in bounces.
 const BOUNCES: u32 = 64;
@@ -54,12 +52,10 @@ impl Paths {
         }
     }
 
-    /// Number of paths.
     pub fn count(&self) -> usize {
         self.path_ends.len()
     }
 
-    /// The first `count` paths.
     fn first(&self, count: usize) -> impl Iterator<Item = &[Vertex]> {
         let starts = std::iter::once(0).chain(self.path_ends.iter().copied());
         let ranges = starts.zip(&self.path_ends).take(count);

@@ -7,12 +7,10 @@ use crate::inverse::settings::{LightSampling, Preset, Settings};
 use crate::study::experiments::course::{
     CACHE_WITHOUT, Evaluator, Mark, cache_settings, cached, descend, paper_settings,
 };
-use crate::study::experiments::findings::{Findings, Summary, brief};
 use crate::study::experiments::objects::{self, Posed};
-use crate::study::experiments::study::{Bench, Limits, Study};
-use crate::study::experiments::twin::{Sizes, twin};
+use crate::study::experiments::study::{Bench, Findings, Limits, Study, Summary, brief};
+use crate::study::experiments::twin::twin;
 
-/// The study.
 pub const STUDY: Study = Study {
     name: "table1",
     question: "The paper, relative error of the diffuse albedo of single objects: 0.00037 % and 0.14 %, where LIME has 0.45 % \
@@ -41,7 +39,7 @@ impl Solved {
 }
 
 fn run(bench: &Bench) -> Result<Findings> {
-    let objects = match twin(bench, Sizes::small(bench.quick))? {
+    let objects = match twin(bench)? {
         Some(twin) => vec![objects::of_twin(&twin)?],
         None => vec![
             objects::convex(bench.quick)?,

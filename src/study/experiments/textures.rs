@@ -12,15 +12,13 @@ use crate::inverse::solver::{Control, Observer, Progress, Termination};
 use crate::math::picture::Picture;
 use crate::room::truth::albedo_picture;
 use crate::study::experiments::course::{cache_settings, paper_settings, solved};
-use crate::study::experiments::findings::{Findings, Grid, Summary, brief};
 use crate::study::experiments::furnished::built_in;
-use crate::study::experiments::study::{Bench, Study};
+use crate::study::experiments::study::{Bench, Findings, Grid, Study, Summary, brief};
 use crate::study::subject::Subject;
 use crate::transport::lit::LitScene;
 use glam::Vec3;
 use std::sync::Arc;
 
-/// The study.
 pub const STUDY: Study = Study {
     name: "textures",
     question: "The paper: once lights are in place, albedos per triangle and then of ever finer triangles recover textures. At \
@@ -46,7 +44,6 @@ struct State {
     picture: Picture,
 }
 
-/// Measures states of the textures.
 struct Measure {
     /// The true albedo seen by each camera.
     truth: Option<Vec<Picture>>,
@@ -85,8 +82,8 @@ fn run(bench: &Bench) -> Result<Findings> {
     ] {
         bench.begin(name)?;
         let solution = solved(bench, subject, settings)?;
-        let (seconds, rays) = (solution.progress.seconds, solution.progress.rays);
-        states.push(measure.state(name, &subject.problem, &solution.estimate, seconds, rays));
+        let (progress, estimate) = (&solution.progress, &solution.estimate);
+        states.push(measure.state(name, &subject.problem, progress, estimate));
         (bench.show)(plot(&states, measure.truth.is_some()));
     }
 
@@ -100,10 +97,13 @@ fn run(bench: &Bench) -> Result<Findings> {
     let solution = solve(&subject.problem, &settings, None, &mut stages)?;
     bench.go_on()?;
     if solution.progress.stages.len() > stages.ended.len() {
-        stages.collect(&solution.progress, &solution.estimate);
+        let end = (solution.progress.clone(), solution.estimate.clone());
+        stages.ended.push(end);
     }
-    for (estimate, seconds, rays, name) in &stages.ended {
-        states.push(measure.state(name, &subject.problem, estimate, *seconds, *rays));
+    for (progress, estimate) in &stages.ended {
+        let stage = progress.stages.last().map_or("", |stage| &stage.name);
+        let name = format!("paper, {stage}");
+        states.push(measure.state(&name, &subject.problem, progress, estimate));
     }
     let judged = match measure.truth {
         Some(_) => {
@@ -150,25 +150,16 @@ fn descent_settings(bench: &Bench) -> Settings {
     }
 }
 
-/// Collects the state after each stage of a solve: estimate, seconds, rays and name.
+/// Collects the state after each stage of a solve.
 struct Stages<'a, 'b> {
     bench: &'a Bench<'b>,
-    ended: Vec<(Estimate, f64, u64, String)>,
-}
-
-impl Stages<'_, '_> {
-    fn collect(&mut self, progress: &Progress, estimate: &Estimate) {
-        let name = progress.stages.last().map_or("", |stage| &stage.name);
-        let name = format!("paper, {name}");
-        let (seconds, rays) = (progress.seconds, progress.rays);
-        self.ended.push((estimate.clone(), seconds, rays, name));
-    }
+    ended: Vec<(Progress, Estimate)>,
 }
 
 impl Observer for Stages<'_, '_> {
     fn observe(&mut self, progress: &Progress, estimate: &Estimate) -> Control {
         if progress.stages.len() > self.ended.len() {
-            self.collect(progress, estimate);
+            self.ended.push((progress.clone(), estimate.clone()));
             let why = progress.stages.last().map_or("", |stage| &stage.why);
             (self.bench.say)(why);
         }
@@ -196,21 +187,16 @@ fn unknowns(estimate: &Estimate) -> usize {
         }
         count
     };
-    estimate
-        .texels
-        .as_ref()
-        .map_or(estimate.objects.len(), cells)
+    let texels = estimate.texels.as_ref();
+    texels.map_or(estimate.objects.len(), cells)
 }
 
 impl Measure {
     fn new(subject: &Subject, truth: Option<&LitScene>) -> Self {
         let scene = &subject.problem.scene;
         let pictures = |lit: &LitScene| {
-            scene
-                .cameras
-                .iter()
-                .map(|c| albedo_picture(lit, c))
-                .collect()
+            let cameras = scene.cameras.iter();
+            cameras.map(|camera| albedo_picture(lit, camera)).collect()
         };
         let counts = scene.ids().triangles.iter().map(|triangles| {
             let reflects = |&triangle: &u32| {
@@ -233,9 +219,8 @@ impl Measure {
         &self,
         name: &str,
         problem: &Problem,
+        progress: &Progress,
         estimate: &Estimate,
-        seconds: f64,
-        rays: u64,
     ) -> State {
         let lit = estimate.lit(&problem.scene);
         let cameras = &problem.scene.cameras;
@@ -256,8 +241,8 @@ impl Measure {
             unknowns: unknowns(estimate),
             psnr,
             loss: self.probe.held_out(problem, estimate).0,
-            seconds,
-            rays,
+            seconds: progress.seconds,
+            rays: progress.rays,
             picture: albedo_picture(&lit, &cameras[SHOWN]),
         }
     }
@@ -339,16 +324,12 @@ fn seen(states: &[State]) -> Vec<String> {
         (None, Some(loss)) => format!("a loss of {}", brief(loss)),
         (None, None) => "nothing measured".to_owned(),
     };
-    let course: Vec<String> = states
-        .iter()
-        .map(|s| format!("{} {}", s.name, score(s)))
-        .collect();
+    let words = |state: &State| format!("{} {}", state.name, score(state));
+    let course: Vec<String> = states.iter().map(words).collect();
     // Larger is better for both.
     let value = |state: &State| {
-        state
-            .psnr
-            .or(state.loss.map(|loss| -loss))
-            .unwrap_or(f64::NAN)
+        let value = state.psnr.or(state.loss.map(|loss| -loss));
+        value.unwrap_or(f64::NAN)
     };
     let mut seen = vec![format!("{}.", course.join("; "))];
     let [objects, textures, start, ..] = states else {

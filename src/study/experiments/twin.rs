@@ -26,62 +26,33 @@ const SAMPLES: [u64; 2] = [16, 128];
 /// The room that a study uses, and the settings of its photographs.
 #[derive(Debug, Clone)]
 pub struct Studied {
-    /// Geometry and truth.
     pub room: Room,
-    /// Settings of its photographs.
     pub rendering: Rendering,
     /// Description, as the beginning of a sentence.
     pub words: String,
 }
 
-impl Studied {
-    /// The room, with photographs of all bounces.
-    ///
-    /// # Errors
-    /// The mesh is empty.
-    pub fn photographed(&self) -> Result<Subject> {
-        Subject::of_room(&self.room, &self.rendering)
-    }
-}
-
-/// Size of a twin's photographs.
-#[derive(Debug, Clone, Copy)]
-pub struct Sizes {
-    /// Pixels along the longer side.
-    pub long_side: u32,
-    /// Total number of paths; each pixel gets between 16 and 128.
-    pub paths: u64,
-}
-
-impl Sizes {
-    /// As small as the photographs of the studies' box room.
-    pub fn small(quick: bool) -> Self {
-        let [width, _] = box_room::rendering(quick).size;
-        Self {
-            long_side: width,
-            paths: if quick { 1_000_000 } else { 8_000_000 },
-        }
-    }
-}
-
-/// The room for a study of one room: the twin of its capture, or the standard box room, photographed by `rendering`.
-///
-/// # Errors
-/// As [`twin`].
+/// The room of a study: the twin of its capture, or the standard box room, photographed by `rendering`. Fails as [`twin`] does.
 pub fn studied(bench: &Bench, rendering: Rendering) -> Result<Studied> {
-    let twin = twin(bench, Sizes::small(bench.quick))?;
-    Ok(twin.unwrap_or_else(|| Studied {
+    Ok(twin(bench)?.unwrap_or_else(|| Studied {
         room: box_room::standard(),
         rendering,
         words: format!("A box room of mean albedo {}", box_room::ALBEDO),
     }))
 }
 
-/// The twin of a study's capture; `None` if it uses its own rooms.
+/// The twin of a study's capture, with photographs as small as those of the box room; `None` if the study uses its own rooms.
 ///
 /// # Errors
 /// The capture cannot be solved, it has no lamp, or the study is stopped.
-pub fn twin(bench: &Bench, sizes: Sizes) -> Result<Option<Studied>> {
+pub fn twin(bench: &Bench) -> Result<Option<Studied>> {
+    let [width, _] = box_room::rendering(bench.quick).size;
+    let paths = if bench.quick { 1_000_000 } else { 8_000_000 };
+    twin_of_size(bench, width, paths)
+}
+
+/// The same with photographs of `long_side` pixels along their longer side. Each pixel gets between 16 and 128 of `paths` paths.
+pub fn twin_of_size(bench: &Bench, long_side: u32, paths: u64) -> Result<Option<Studied>> {
     let Some(subject) = bench.subject else {
         return Ok(None);
     };
@@ -92,7 +63,7 @@ pub fn twin(bench: &Bench, sizes: Sizes) -> Result<Option<Studied>> {
     };
     let estimate = solved(bench, subject, &settings)?.estimate;
     let room = room_of(subject, &estimate)?;
-    let rendering = rendering(&subject.problem.scene.cameras, sizes);
+    let rendering = rendering(&subject.problem.scene.cameras, long_side, paths);
     let [width, height] = rendering.size;
     Ok(Some(Studied {
         words: format!(
@@ -157,18 +128,15 @@ fn view(scene: &Scene, camera: &Camera) -> View {
 }
 
 /// Settings of photographs with the aspect ratio of the first camera.
-fn rendering(cameras: &[Camera], sizes: Sizes) -> Rendering {
+fn rendering(cameras: &[Camera], long_side: u32, paths: u64) -> Rendering {
     let size = (cameras.first()).map_or([1; 2], |camera| {
-        let small = camera.shrunk(sizes.long_side).intrinsics;
+        let small = camera.shrunk(long_side).intrinsics;
         [small.width, small.height]
     });
     let pixels = cameras.len() as u64 * u64::from(size[0]) * u64::from(size[1]);
     let [min, max] = SAMPLES;
-    Rendering {
-        seed: box_room::PHOTOGRAPH_SEED,
-        samples: (sizes.paths / pixels.max(1)).clamp(min, max) as u32,
-        size,
-    }
+    let samples = (paths / pixels.max(1)).clamp(min, max) as u32;
+    Rendering::new(box_room::PHOTOGRAPH_SEED, samples, size)
 }
 
 #[cfg(test)]
@@ -194,7 +162,7 @@ mod tests {
     fn a_twin_has_the_captures_views_and_nearly_its_photographs_and_its_truth_is_its_own() {
         let mut subject = box_room::photographed(true).expect("a room");
         subject.metric = Metric::HeldOut;
-        let twin = twin(&bench(&subject), Sizes::small(true));
+        let twin = twin(&bench(&subject));
         let twin = twin.expect("solved").expect("on a capture");
         let original = box_room::standard();
         for (view, other) in twin.room.views.iter().zip(&original.views) {
@@ -207,7 +175,7 @@ mod tests {
             let found = material.albedo_at(&Hit::default());
             assert!((found - *wanted).abs().max_element() < 0.1 || material.emission != Vec3::ZERO);
         }
-        let photographed = twin.photographed().expect("a room");
+        let photographed = Subject::of_room(&twin.room, &twin.rendering).expect("a room");
         assert!(photographed.truth().is_some());
         let mean = |subject: &Subject| {
             let pixels = subject.problem.photographs.iter().flat_map(|p| &p.pixels);
@@ -224,7 +192,7 @@ mod tests {
         let mut room = box_room::standard();
         (room.materials.iter_mut()).for_each(|material| material.emission = Vec3::ZERO);
         let subject = Subject::of_room(&room, &box_room::rendering(true)).expect("a room");
-        let refused = twin(&bench(&subject), Sizes::small(true)).expect_err("no lamp");
+        let refused = twin(&bench(&subject)).expect_err("no lamp");
         assert!(refused.to_string().contains("no lamp"), "{refused}");
     }
 }

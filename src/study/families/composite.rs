@@ -11,14 +11,12 @@ use crate::math::color::linear_to_srgb;
 use crate::math::picture::Picture;
 use crate::math::stats::quantile;
 use crate::room::generated::Family;
-use crate::room::shape::Modeller;
 use crate::scene::Scene;
-use crate::study::experiments::{Cylinder, chair, insert, places, up, upright};
+use crate::study::experiments::{Cylinder, chair_model, insert, places, up, upright};
 use crate::study::families::Plan;
 use crate::study::families::row::{RoomRow, SolveKey};
 use crate::study::families::score::{Solved, solved};
 use crate::transport::lit::LitScene;
-use crate::transport::material::Material;
 use crate::transport::path::PathOptions;
 use glam::{DAffine3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -80,8 +78,7 @@ pub struct CompositeRow {
     pub slope: Option<f64>,
 }
 
-/// Generates and solves a room, and inserts a chair into the photographs that see most of it. `None` if the floor has
-/// no visible free place.
+/// Generates and solves a room, and inserts a chair into the photographs that see most of it. `None` without a visible free place.
 ///
 /// # Errors
 /// The room cannot be generated or solved.
@@ -200,15 +197,8 @@ fn standing(truth: &LitScene) -> Result<Option<Arc<ObjectModel>>> {
         return Ok(None);
     };
     let at = (place + up * LIFT).as_dvec3() + scene.origin;
-    let mut modeller = Modeller::default();
-    modeller.object("chair");
-    modeller.placed(DAffine3::from_translation(at) * upright(up), chair);
-    let mesh = modeller.mesh;
-    let corners = (mesh.triangles.iter())
-        .map(|corners| corners.map(|i| mesh.positions[i as usize]))
-        .collect();
-    let material = Material::diffuse(ALBEDO, Vec3::ZERO);
-    ObjectModel::from_corners("chair", corners, material).map(|model| Some(Arc::new(model)))
+    let stand = DAffine3::from_translation(at) * upright(up);
+    chair_model("chair", stand, ALBEDO).map(Some)
 }
 
 /// The chair where it is modelled.
@@ -306,7 +296,6 @@ fn scores(
     let truth_at = |i: usize| shown(exposed(i, &layers.with));
     let change_at = |i: usize| truth_at(i) - shown(exposed(i, &layers.without));
 
-    // The composites.
     let scene = &problem.scene;
     let placed = [placed(chair, scene)?];
     let lit = Arc::new(estimate.lit(scene));

@@ -4,18 +4,15 @@
 //! rooms.json and rooms.png summarize all rows of rooms.csv of one program version, preset and size.
 
 mod composite;
-mod lamps;
-mod plot;
 mod row;
 mod score;
 mod segments;
 mod summary;
 
 pub use composite::{CompositeRow, Decision, composite};
-pub use plot::plot;
 pub use row::{RoomRow, Row, Rows, SolveKey};
 pub use score::measure;
-pub use summary::{Quantiles, Summary, summarize};
+pub use summary::{Quantiles, Summary, plot, summarize};
 
 use crate::error::{Error, Result};
 use crate::inverse::settings::Preset;
@@ -46,8 +43,7 @@ pub enum RoomEvent<'a> {
     Failed(&'a Error),
 }
 
-/// Solves the rooms that rooms.csv in `folder` lacks, until `stopped`; then writes rooms.json and rooms.png over all
-/// rows that belong to the plan.
+/// Solves rooms that rooms.csv in `folder` lacks, until `stopped`; then writes rooms.json and rooms.png over all rows of the plan.
 ///
 /// # Errors
 /// A file cannot be read or written, or rooms.csv is another table. Rooms that cannot be solved are reported and left out.

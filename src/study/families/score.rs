@@ -10,6 +10,7 @@ use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::inverse::solve;
 use crate::inverse::solver::{Control, Observer, Progress, Solution};
+use crate::math::color::luminance_f64;
 use crate::math::stats::weighted_median;
 use crate::room::generated::{Family, Generated};
 use crate::scene::Scene;
@@ -17,20 +18,23 @@ use crate::scene::prepare::prepare;
 use crate::study::albedo_pictures;
 use crate::study::evaluate::{ObjectErrors, Reference};
 use crate::study::families::Plan;
-use crate::study::families::lamps;
 use crate::study::families::row::Row;
 use crate::study::families::segments;
+use crate::transport::environment::Environment;
+use glam::DVec3;
 use std::sync::Arc;
+
+/// Largest factor between the estimated and the true emission of a lamp that counts as found.
+const FACTOR: f64 = 2.0;
+/// An object without emission is a false lamp above this fraction of the largest true emission.
+const FALSE_FRACTION: f64 = 0.01;
 
 /// A room and its solution.
 pub struct Solved {
-    /// The room.
     pub room: Generated,
     /// The capture that was solved; cut into segments if it is a scan.
     pub capture: Capture,
-    /// Scene and photographs.
     pub problem: Problem,
-    /// The outcome.
     pub solution: Solution,
 }
 
@@ -85,7 +89,7 @@ pub fn measure(family: Family, seed: u64, plan: &Plan) -> Result<Row> {
     })?;
     let reference = Reference::new(truth, &capture, scene, &problem.photographs);
     let errors = reference.errors(scene, estimate);
-    let lamps = lamps::count(&errors.per_object, room.lit.outside.as_deref());
+    let lamps = count_lamps(&errors.per_object, room.lit.outside.as_deref());
     let claimed = claimed(scene, estimate, &errors.per_object);
     let coverage = |errors: f64| {
         let within = claimed.iter().filter(|(off, error)| *off <= errors * error);
@@ -135,8 +139,7 @@ impl Observer for Unwatched {
     }
 }
 
-/// Albedos, by channel, of all objects whose albedo is scored and reported as determined: how far off each is, and its reported
-/// standard error.
+/// Albedos by channel of all objects whose albedo is scored and reported as determined: the error of each, and its standard error.
 fn claimed(
     scene: &Scene,
     estimate: &Estimate,
@@ -144,10 +147,8 @@ fn claimed(
 ) -> Vec<(f64, f64)> {
     let scored = errors.iter().filter(|(_, errors)| errors.scored);
     let known = scored.filter_map(|(name, errors)| {
-        let place = scene
-            .objects
-            .iter()
-            .position(|object| object.name == *name)?;
+        let mut objects = scene.objects.iter();
+        let place = objects.position(|object| object.name == *name)?;
         let estimated = estimate.objects.get(place)?;
         Some((estimated, errors.albedo_true?)).filter(|_| estimated.albedo_identifiable)
     });
@@ -158,4 +159,71 @@ fn claimed(
         })
     });
     channels.collect()
+}
+
+/// Numbers of lamps.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+struct Lamps {
+    /// True lamps.
+    true_count: u64,
+    /// True lamps whose brightness was found.
+    found: u64,
+    /// False lamps: objects without emission that were given one.
+    false_count: u64,
+}
+
+/// Counts lamps by luminance. Without true lamps, false ones are measured against the mean radiance from outside.
+fn count_lamps(errors: &[(String, ObjectErrors)], outside: Option<&Environment>) -> Lamps {
+    let light = |emission: [f64; 3]| luminance_f64(DVec3::from(emission));
+    let lamps = errors.iter().filter(|(_, errors)| errors.emitter);
+    let brightest = lamps.map(|(_, errors)| light(errors.emission_true));
+    let sky = || outside.map_or(0.0, |map| map.power() / (4.0 * std::f64::consts::PI));
+    let brightest = brightest.reduce(f64::max).unwrap_or_else(sky);
+    let mut lamps = Lamps::default();
+    for (_, errors) in errors {
+        let [estimated, known] = [errors.emission, errors.emission_true].map(light);
+        if errors.emitter {
+            lamps.true_count += 1;
+            lamps.found += u64::from(estimated <= FACTOR * known && known <= FACTOR * estimated);
+        } else {
+            lamps.false_count += u64::from(estimated > FALSE_FRACTION * brightest);
+        }
+    }
+    lamps
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn object(emission: f64, known: f64) -> (String, ObjectErrors) {
+        let errors = ObjectErrors {
+            emitter: known > 0.0,
+            emission: [emission; 3],
+            emission_true: [known; 3],
+            ..ObjectErrors::default()
+        };
+        (String::new(), errors)
+    }
+
+    #[test]
+    fn a_factor_of_two_is_found_and_a_hundredth_of_the_brightest_is_made_up() {
+        let objects = [
+            object(5.1, 10.0),
+            object(4.9, 10.0),
+            object(19.9, 10.0),
+            object(20.1, 10.0),
+            object(0.11, 0.0),
+            object(0.09, 0.0),
+        ];
+        let expected = Lamps {
+            true_count: 4,
+            found: 2,
+            false_count: 1,
+        };
+        assert_eq!(count_lamps(&objects, None), expected);
+        let sky = Environment::new(4, 2, vec![glam::Vec3::ONE; 8]);
+        let dark = [object(0.02, 0.0), object(0.005, 0.0)];
+        assert_eq!(count_lamps(&dark, sky.as_ref()).false_count, 1);
+    }
 }

@@ -24,14 +24,17 @@ struct Sum {
 pub fn truth(room: &Generated, scene: &Scene) -> Truth {
     let mut sums = vec![Sum::default(); scene.objects.len()];
     for (frame, triangles) in scene.ids().triangles.iter().enumerate() {
-        let (albedo, emission) = (room.albedo(frame), room.emission(frame));
-        let pixels = albedo.pixels.iter().zip(&emission.pixels);
-        for (&triangle, (albedo, emission)) in triangles.iter().zip(pixels) {
+        let albedo = room.albedo(frame);
+        let truly_seen = &room.lit.scene.ids().triangles[frame];
+        let pixels = albedo.pixels.iter().zip(truly_seen);
+        for (&triangle, (albedo, &truly)) in triangles.iter().zip(pixels) {
             let Some(&segment) = scene.object_of.get(triangle as usize) else {
                 continue;
             };
+            let object = room.lit.scene.object_of.get(truly as usize);
+            let emission = object.map_or(Vec3::ZERO, |&o| room.lit.materials[o as usize].emission);
             let sum = &mut sums[segment as usize];
-            if *emission == Vec3::ZERO {
+            if emission == Vec3::ZERO {
                 sum.surfaces += 1.0;
                 sum.albedo += albedo.as_dvec3();
             } else {

@@ -15,11 +15,9 @@ pub fn combine(captures: &[Vec<Curve>]) -> Vec<Curve> {
     };
     (first.iter().enumerate())
         .filter_map(|(index, curve)| {
-            let same: Option<Vec<&Curve>> = captures
-                .iter()
-                .map(|curves| curves.get(index).filter(|c| !c.points.is_empty()))
-                .collect();
-            let same = same?;
+            let same = captures.iter().map(|curves| curves.get(index));
+            let same = same.map(|c| c.filter(|c| !c.points.is_empty()));
+            let same: Vec<&Curve> = same.collect::<Option<_>>()?;
             Some(Curve {
                 ended: None,
                 rejected: same.iter().map(|c| c.rejected).sum(),

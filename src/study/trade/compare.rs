@@ -21,16 +21,13 @@ fn first_to_reach<'a>(
         .min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Compares the presets with the paper's descent: times to an albedo error of 0.02, and to the smallest error that any descent
-/// reached.
+/// Compares the presets with the paper's descent: times to an albedo error of 0.02, and to the smallest error of any descent.
 pub fn against_paper(curves: &[Curve]) -> Vec<String> {
     let is_paper = |curve: &&Curve| curve.settings.preset == Preset::Paper;
     let paper = || curves.iter().filter(is_paper);
     let presets = || curves.iter().filter(|c| c.is_preset && !is_paper(c));
-    let longest = paper()
-        .filter_map(|curve| curve.points.last())
-        .map(|point| point.seconds)
-        .fold(0.0, f64::max);
+    let ends = paper().filter_map(|curve| curve.points.last());
+    let longest = ends.map(|point| point.seconds).fold(0.0, f64::max);
     if longest == 0.0 {
         return Vec::new();
     }

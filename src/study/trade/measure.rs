@@ -73,7 +73,6 @@ pub fn watch(
     };
     let solution = solve(problem, &run.settings, None, &mut watch)?;
 
-    // The last point.
     watch.add_point(&solution.progress, &solution.estimate);
     let ended = match solution.termination {
         Termination::Cancelled if watch.late => Termination::Time,

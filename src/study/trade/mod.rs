@@ -5,7 +5,6 @@
 pub mod combine;
 pub mod compare;
 mod curve;
-pub mod front;
 mod measure;
 mod metric;
 pub mod plan;

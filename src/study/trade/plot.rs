@@ -53,10 +53,8 @@ pub fn plot(trade: &Trade) -> Plot {
 /// The points on the front, in order of seconds.
 fn front(curves: &[Curve]) -> Vec<[f64; 2]> {
     let all = curves.iter().flat_map(|curve| &curve.points);
-    let mut front: Vec<[f64; 2]> = all
-        .filter(|point| point.pareto)
-        .map(|point| [point.seconds, point.error])
-        .collect();
+    let front = all.filter(|point| point.pareto);
+    let mut front: Vec<[f64; 2]> = front.map(|p| [p.seconds, p.error]).collect();
     front.sort_by(|a, b| a[0].total_cmp(&b[0]));
     front
 }

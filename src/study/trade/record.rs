@@ -5,7 +5,7 @@ use crate::export::atomic::write_bytes;
 use crate::export::table::{Cell, Table};
 use crate::study::machine::Machine;
 use crate::study::trade::curve::{Curve, Measure, Point};
-use crate::study::trade::{compare, front, plot};
+use crate::study::trade::{compare, plot};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Duration;
@@ -44,8 +44,7 @@ pub struct Trade {
 }
 
 impl Trade {
-    /// A trade of one capture from its curves, in the order of [`plan`](crate::study::trade::plan). Marks the Pareto
-    /// front and draws conclusions.
+    /// A trade of one capture from its curves, in the order of [`super::plan`]. Marks the Pareto front and draws conclusions.
     pub fn new(
         capture: &str,
         hash: Option<String>,
@@ -53,7 +52,7 @@ impl Trade {
         elapsed: Duration,
         mut curves: Vec<Curve>,
     ) -> Self {
-        front::mark(&mut curves);
+        mark_front(&mut curves);
         let findings = match measure {
             Measure::Albedo => compare::against_paper(&curves),
             Measure::HeldOut => Vec::new(),
@@ -174,4 +173,50 @@ fn line(curve: &Curve, width: usize) -> String {
         last.rays as f64 * 1e-6,
         if last.pareto { "yes" } else { "" }
     )
+}
+
+/// Marks the Pareto front: the points of all curves that no other point dominates: none is as early and as accurate, and better in
+/// one of the two. Of equal points only the first is marked.
+fn mark_front(curves: &mut [Curve]) {
+    let points = curves.iter_mut().flat_map(|curve| &mut curve.points);
+    let mut points: Vec<&mut Point> = points.collect();
+    // The sort is stable: equal points stay in order.
+    points.sort_by(|p, q| {
+        let earlier = p.seconds.total_cmp(&q.seconds);
+        earlier.then(p.error.total_cmp(&q.error))
+    });
+    let mut best = f64::INFINITY;
+    for point in points {
+        point.pareto = point.error < best;
+        if point.pareto {
+            best = point.error;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inverse::settings::Preset;
+    use crate::math::rng::Stream;
+
+    #[test]
+    fn a_point_is_on_the_front_exactly_if_no_other_beats_it() {
+        let mut stream = Stream::new(1, 0, 0, 0);
+        for count in 0..60 {
+            // Few distinct values, so that many are equal.
+            let points: Vec<[f64; 2]> = (0..count)
+                .map(|_| [0, 1].map(|_| stream.below(9) as f64))
+                .collect();
+            let mut curves = [Curve::through(Preset::Balanced, &points)];
+            mark_front(&mut curves);
+            for (i, p) in points.iter().enumerate() {
+                let beaten = points.iter().enumerate().any(|(j, q)| {
+                    let as_good = q[0] <= p[0] && q[1] <= p[1];
+                    as_good && (q != p || j < i)
+                });
+                assert_eq!(curves[0].points[i].pareto, !beaten, "{i} of {points:?}");
+            }
+        }
+    }
 }
