@@ -11,12 +11,9 @@ mod numbers;
 mod object_values;
 mod options;
 mod parameters;
-mod photographs;
 mod progress;
 pub mod reference;
 mod render;
-mod report;
-mod saved;
 mod solve;
 mod study;
 mod trade;
@@ -138,7 +135,7 @@ fn open(arguments: Arguments, window: Option<Window>) -> Result<i32> {
         None => "this build has no window".to_owned(),
         Some(_) if !has_display() => "no display".to_owned(),
         Some(window) => {
-            solve::use_threads(options.threads)?;
+            options::use_threads(options.threads)?;
             let settings = options.parameters.over(&Settings::default());
             let start = match options.out.clone().filter(|_| options.resume) {
                 Some(results) => Start::Results(results),
