@@ -12,7 +12,6 @@ mod object_values;
 mod options;
 mod parameters;
 mod progress;
-pub mod reference;
 mod render;
 mod solve;
 mod study;
@@ -60,6 +59,19 @@ pub fn run(window: Option<Window>) -> i32 {
             error.exit_code()
         }
     }
+}
+
+/// The commands with their options, as the manual lists them.
+pub fn command() -> clap::Command {
+    Arguments::command()
+}
+
+/// Checks a command line, given as its words without `relit` in front.
+///
+/// # Errors
+/// The command line is wrong, or asks for help or the version.
+pub fn check(words: &[&str]) -> std::result::Result<(), clap::Error> {
+    Arguments::from_words(std::iter::once(&"relit").chain(words)).map(drop)
 }
 
 /// Runs the command. Returns the exit code: 0, or that of an interrupt.
