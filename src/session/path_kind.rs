@@ -9,7 +9,6 @@ use std::path::{Path, PathBuf};
 /// The content of a path.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum PathKind {
-    /// The folder of a capture.
     Capture(PathBuf),
     /// Results of a solve, to be resumed.
     Results(PathBuf),
