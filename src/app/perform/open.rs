@@ -58,7 +58,6 @@ impl App {
         self.view.shell.start.asked = true;
     }
 
-    /// Opens what was imported.
     pub(in crate::app) fn take_import(&mut self) {
         let Some((out, task)) = &mut self.jobs.importing else {
             return;
