@@ -36,7 +36,6 @@ impl Pick {
 
 #[derive(Debug, Clone, Default)]
 pub struct Tool {
-    /// What the next click is asked for.
     pub pick: Option<Pick>,
     /// Whether the next click places the chosen inserted object.
     pub placing: bool,

@@ -8,7 +8,7 @@ use crate::cli::progress::bar;
 use crate::error::Result;
 use crate::export;
 use crate::say;
-use crate::session::path_kind::PathKind;
+use crate::session::command::PathKind;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum};
 use glam::DVec3;

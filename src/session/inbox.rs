@@ -9,10 +9,8 @@ use std::time::Duration;
 /// Capacity of the queue. Insertions and edits always find room: only the newest of each is kept.
 pub const CAPACITY: usize = 256;
 
-/// The sending end.
 pub struct Outbox(Arc<Queue>);
 
-/// The worker's end.
 pub struct Inbox(Arc<Queue>);
 
 #[derive(Default)]
@@ -30,7 +28,6 @@ struct Waiting {
 
 /// An entry of the inbox.
 pub enum Mail {
-    /// A command.
     Command(Command),
     /// Nothing is waiting.
     Nothing,
@@ -93,7 +90,6 @@ impl Outbox {
 }
 
 impl Inbox {
-    /// The next command, if one is waiting.
     pub fn poll(&self) -> Mail {
         self.0.lock().take()
     }

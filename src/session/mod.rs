@@ -10,7 +10,6 @@ pub mod light;
 pub mod open;
 pub(crate) mod open_capture;
 pub(crate) mod painter;
-pub(crate) mod path_kind;
 pub mod photographs;
 pub(crate) mod rates;
 pub mod save;

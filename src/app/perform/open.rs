@@ -8,8 +8,7 @@ use crate::capture::import::{self, ImportOptions};
 use crate::capture::read::CAMERAS;
 use crate::error::{Error, Result};
 use crate::export;
-use crate::session::command::{Command, Source};
-use crate::session::path_kind::PathKind;
+use crate::session::command::{Command, PathKind, Source};
 use crate::session::snapshot::Level;
 use std::path::{Path, PathBuf};
 

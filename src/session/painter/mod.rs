@@ -47,7 +47,6 @@ pub struct Painter {
 }
 
 impl Painter {
-    /// A painter with as many threads as the solver.
     pub fn new(requests: Arc<Requests>, slot: Arc<Slot>, wake: Wake) -> Result<Self> {
         let threads = ThreadPoolBuilder::new()
             .num_threads(rayon::current_num_threads())

@@ -57,7 +57,6 @@ impl Staging {
         Ok(path)
     }
 
-    /// Writes a small file.
     pub fn write(&mut self, name: impl AsRef<Path>, bytes: &[u8]) -> Result<()> {
         let path = self.file(&name)?;
         write_bytes(&path, bytes).map_err(|error| self.named(error))
@@ -109,7 +108,6 @@ fn locked(folder: &Path) -> Option<File> {
     Some(file)
 }
 
-/// Deletes temporary folders of killed programs.
 fn remove_abandoned(target: &Path) {
     for entry in fs::read_dir(target).into_iter().flatten().flatten() {
         let unfinished = entry.file_name().to_string_lossy().starts_with(UNFINISHED);

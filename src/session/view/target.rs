@@ -133,7 +133,6 @@ impl Target {
         }
     }
 
-    /// Whether there is nothing left to render.
     pub fn is_done(&self) -> bool {
         let sharp = !self.watched || self.render.samples() >= MAX_SAMPLES;
         self.coarse.is_none() && !self.stale && sharp

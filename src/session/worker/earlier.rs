@@ -12,7 +12,6 @@ use crate::session::worker::state::{Next, Worker};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// State of a capture from an earlier run.
 pub(super) struct Earlier {
     folder: PathBuf,
     saved: Saved,
@@ -117,7 +116,6 @@ impl Worker {
 }
 
 impl Earlier {
-    /// Loads the state of a capture from a folder.
     fn new(folder: &Path, saved: Saved, capture: &OpenCapture) -> Result<Self> {
         Ok(Self {
             estimate: saved.estimate_for(capture)?,

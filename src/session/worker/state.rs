@@ -17,12 +17,10 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// The worker's next step.
 pub(super) enum Next {
     Wait,
     /// Open a capture, then continue its last session or solve it.
     Open(Source, OpenOptions, Begin),
-    /// Load results of an earlier run and continue them.
     Resume(PathBuf),
     /// Solve the open capture, from the start or from a checkpoint.
     Solve(Option<Checkpoint>),
@@ -44,7 +42,6 @@ pub(super) enum Begin {
     Anew,
 }
 
-/// Everything the worker owns.
 pub(super) struct Worker {
     pub inbox: Inbox,
     pub slot: Arc<Slot>,

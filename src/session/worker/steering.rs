@@ -38,7 +38,6 @@ impl<'a> Steering<'a> {
         }
     }
 
-    /// What to do after the solve.
     pub fn next(self) -> Next {
         self.next.unwrap_or(Next::Wait)
     }

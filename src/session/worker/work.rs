@@ -44,7 +44,6 @@ impl Worker {
         }
     }
 
-    /// Reports a panic; the last estimate is kept.
     fn contain(&mut self, payload: &(dyn Any + Send)) {
         (self.solving, self.paused, self.step) = (false, false, false);
         self.state.phase = Phase::Failed;
