@@ -21,12 +21,10 @@ pub struct Step {
     edits: Edits,
 }
 
-/// The document.
 #[derive(Default)]
 pub struct Document {
     /// The worker's newest snapshot.
     pub snapshot: Arc<Snapshot>,
-    /// What is being opened.
     pub opening: Option<Source>,
     /// The parameters as edited here.
     pub settings: Settings,
@@ -34,7 +32,6 @@ pub struct Document {
     pub edits: Edits,
     /// The estimate with those changes.
     pub estimate: Arc<Estimate>,
-    /// The inserted objects.
     pub insertions: Insertions,
     /// All changes of the capture's objects since it was read.
     pub regroups: Vec<Regroup>,
@@ -86,12 +83,10 @@ impl Document {
         capture.is_none_or(|open| open.options.objects == self.regroups)
     }
 
-    /// Whether objects can be regrouped.
     pub fn can_regroup(&self) -> bool {
         self.capture().is_some() && self.objects_are_current()
     }
 
-    /// Names of the capture's objects.
     pub fn names(&self, objects: &[u32]) -> Vec<String> {
         let all = (self.capture()).map_or(&[][..], |open| &open.capture.mesh.objects);
         let names = objects.iter().filter_map(|&k| all.get(k as usize));
@@ -106,7 +101,6 @@ impl Document {
         self.history = History::starting_at(self.step());
     }
 
-    /// Applies the edits to the estimate.
     pub fn apply_edits(&mut self) {
         self.estimate = self.edited.of(&self.snapshot.estimate, &self.edits);
     }
@@ -146,7 +140,6 @@ impl Document {
         self.edits.object(object).off || found.is_some_and(|found| found.emission != Vec3::ZERO)
     }
 
-    /// Switches a lamp off, or on again.
     pub fn switch_lamp(&mut self, object: usize) {
         let edit = self.edits.object(object);
         let off = !edit.off;

@@ -1,33 +1,32 @@
 //! The window: panes over a session, drawn by egui and wgpu. Talks to the worker through [`worker::Connection`].
 
 pub mod action;
-pub mod controls;
-pub mod document;
-pub mod insertion;
-pub mod jobs;
+mod controls;
+mod document;
+mod insertion;
 pub mod layout;
 pub mod lights;
 pub mod model;
-pub mod number;
-pub mod pace;
+mod number;
+mod pace;
 pub mod panels;
 mod panes;
 mod perform;
 pub mod picture;
 pub mod preferences;
-pub mod request;
+mod request;
 mod run;
-pub mod selection;
+mod selection;
 pub mod shell;
-pub mod shown;
+mod shown;
 pub mod state;
-pub mod task;
-pub mod theme;
-pub mod tool;
+mod task;
+mod theme;
+mod tool;
 pub mod trade;
-pub mod undo;
+mod undo;
 mod update;
-pub mod view;
+mod view;
 pub mod window;
 pub mod worker;
 

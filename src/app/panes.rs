@@ -1,10 +1,9 @@
 //! Draws the panes in their tiles. Each borrows what it shows; what it asks for is done once it is drawn.
 
-use crate::app::jobs::Jobs;
 use crate::app::layout::Pane;
 use crate::app::picture::quantity::Quantity;
 use crate::app::request::Requests;
-use crate::app::state::App;
+use crate::app::state::{App, Jobs};
 use crate::app::view::Parts;
 use crate::app::{model, panels, picture, theme};
 use egui::{Color32, ScrollArea, Stroke, Ui, Visuals};
@@ -12,9 +11,7 @@ use egui_tiles::{Behavior, SimplificationOptions, TabState, TileId, Tiles, UiRes
 
 /// Draws panes for the tree.
 pub struct Panes<'a> {
-    /// The state they show.
     pub app: &'a mut App,
-    /// What they ask for.
     pub requests: &'a mut Requests,
     /// The tabs in front. Only these have a button that closes them, so that all have room for their names.
     pub front: Vec<TileId>,

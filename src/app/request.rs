@@ -16,10 +16,8 @@ use egui::{Button, Response, Ui};
 use std::collections::HashSet;
 use std::path::PathBuf;
 
-/// What is asked.
 #[derive(Debug, Clone)]
 pub enum Request {
-    /// An action of the menus.
     Act(Action),
     /// A click in a view, on a surface or past all of them, and whether it adds to the selection.
     Click(Option<Clicked>, bool),
@@ -31,15 +29,12 @@ pub enum Request {
     Show(usize),
     /// Shows a photograph, and the 3D view from its camera.
     LookThrough(usize),
-    /// Opens a capture.
     Open(Source),
-    /// Opens whatever lies at a path.
     OpenPath(PathBuf),
     /// Goes on with a session that is kept.
     Resume(PathBuf),
     /// Ends the import of a scan; nothing is written of it.
     CancelImport,
-    /// Opens a file dialog.
     Browse(Ask),
     /// Adds the object in a file.
     Insert(PathBuf),
@@ -55,23 +50,18 @@ pub enum Request {
     Edit(usize, ObjectEdit),
     /// Changes the light of a lamp's objects; that from outside where there are none.
     Light(Vec<usize>, Gain),
-    /// Gives an object of the scene another name.
     Rename(u32, String),
     /// Makes faces, in ascending order, an object of their own.
     CutOut(Vec<u32>),
-    /// Replaces the parameters.
     Set(Box<Settings>),
     /// Takes over the parameters of a curve of the trade, and stops there.
     Stop(usize, Stop),
     /// Writes the trade where it is found when the capture is opened next.
     KeepTrade,
-    /// Writes photographs.
     Photographs(Wanted),
     /// Makes a length in the capture's coordinates so many metres.
     Length(f64, f64),
-    /// Hands a command to the worker.
     Send(Command),
-    /// Says something.
     Say(Level, String),
 }
 
@@ -89,7 +79,6 @@ pub struct Requests {
 }
 
 impl Requests {
-    /// Nothing asked yet.
     pub fn new(possible: HashSet<Action>) -> Self {
         let asked = Vec::new();
         Self { possible, asked }
@@ -100,17 +89,14 @@ impl Requests {
         self.possible.contains(&action)
     }
 
-    /// Asks.
     pub fn ask(&mut self, request: impl Into<Request>) {
         self.asked.push(request.into());
     }
 
-    /// Asks all.
     pub fn ask_all(&mut self, requests: impl IntoIterator<Item = Request>) {
         self.asked.extend(requests);
     }
 
-    /// Takes out what was asked.
     pub fn take(&mut self) -> Vec<Request> {
         std::mem::take(&mut self.asked)
     }

@@ -34,7 +34,6 @@ impl Selection {
         self.object.into_iter().chain(also).collect()
     }
 
-    /// Whether an object is selected.
     pub fn contains(&self, object: u32) -> bool {
         self.object == Some(object) || self.also.contains(&object)
     }

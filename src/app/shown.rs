@@ -7,7 +7,6 @@ use crate::session::snapshot::{Insertion, View};
 use egui::Pos2;
 use std::sync::Arc;
 
-/// The shown view.
 #[derive(Debug, Clone, Default)]
 pub struct Shown {
     /// The chosen photograph.
@@ -22,7 +21,6 @@ impl Shown {
         self.free.is_none().then_some(self.frame)
     }
 
-    /// Shows a photograph and what belongs to it.
     pub fn show(&mut self, frame: usize) {
         (self.frame, self.free) = (frame, None);
     }
@@ -34,7 +32,6 @@ impl Shown {
         }
     }
 
-    /// The camera of the shown view.
     pub fn camera<'a>(&'a self, document: &'a Document) -> Option<&'a Camera> {
         match &self.free {
             Some(camera) => Some(camera),

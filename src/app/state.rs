@@ -1,12 +1,17 @@
 //! Everything that the window knows. Panes borrow parts of it and return requests.
 
 use crate::app::document::Document;
-use crate::app::jobs::Jobs;
 use crate::app::preferences::Preferences;
+use crate::app::shell::dialogs::Dialogs;
+use crate::app::shell::notices::Notices;
+use crate::app::shell::status::Batch;
+use crate::app::task::Task;
+use crate::app::trade::Measured;
 use crate::app::view::ViewState;
 use crate::app::worker::{Connection, Worker};
 use crate::session::command::{Command, Source};
 use crate::session::snapshot::{Level, Phase};
+use std::path::PathBuf;
 
 /// Everything that the window knows.
 pub struct App {
@@ -20,6 +25,22 @@ pub struct App {
     pub preferences: Preferences,
 }
 
+/// What runs beside the window: the worker, and work on threads of its own.
+pub struct Jobs {
+    /// The worker.
+    pub worker: Worker,
+    /// Photographs that are being written.
+    pub batch: Option<Batch>,
+    /// A scan that is being imported, and the folder of the capture that is made of it.
+    pub importing: Option<(PathBuf, Task<(), Vec<String>>)>,
+    /// The trade of speed for exactness, read or being measured.
+    pub measured: Measured,
+    /// File dialogs.
+    pub dialogs: Dialogs,
+    /// What is said of all that runs.
+    pub notices: Notices,
+}
+
 impl App {
     /// A window on a session.
     pub fn new(connection: Box<dyn Connection>, preferences: Preferences) -> Self {
@@ -28,7 +49,14 @@ impl App {
         Self {
             document: Document::default(),
             view,
-            jobs: Jobs::new(Worker::new(connection)),
+            jobs: Jobs {
+                worker: Worker::new(connection),
+                batch: None,
+                importing: None,
+                measured: Measured::default(),
+                dialogs: Dialogs::default(),
+                notices: Notices::default(),
+            },
             preferences,
         }
     }

@@ -33,7 +33,6 @@ impl<N> Progress<N> {
         self.ctx.request_repaint();
     }
 
-    /// Whether it is to end.
     pub fn is_cancelled(&self) -> bool {
         self.cancelled.load(Ordering::Relaxed)
     }
@@ -41,9 +40,6 @@ impl<N> Progress<N> {
 
 impl<N: Send + 'static, E: Send + 'static> Task<N, E> {
     /// Begins; the window is painted again whenever there is something new.
-    ///
-    /// # Errors
-    /// The system grants no thread.
     pub fn begin(
         name: &'static str,
         ctx: &egui::Context,

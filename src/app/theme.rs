@@ -10,10 +10,8 @@ macro_rules! tokens {
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub struct Tokens { $(#[doc = $what] pub $name: Color32,)* }
 
-        /// The dark theme.
         pub const DARK: Tokens = Tokens { $($name: Color32::from_rgb $dark,)* };
 
-        /// The light theme.
         pub const LIGHT: Tokens = Tokens { $($name: Color32::from_rgb $light,)* };
     };
 }
@@ -70,7 +68,6 @@ pub fn strip(ui: &mut Ui, controls: impl FnOnce(&mut Ui)) {
     });
 }
 
-/// Installs both themes in a context.
 pub fn install(ctx: &egui::Context) {
     for (theme, tokens) in [(Theme::Dark, &DARK), (Theme::Light, &LIGHT)] {
         ctx.style_mut_of(theme, |style| {

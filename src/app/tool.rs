@@ -16,7 +16,6 @@ pub enum Pick {
     Probe,
     /// The ends of a known length, of which the first may be there.
     Length(Option<DVec3>),
-    /// A surface that is the ground.
     Ground,
     /// Faces that become an object of their own, by a line around them.
     Lasso,
@@ -35,10 +34,8 @@ impl Pick {
     }
 }
 
-/// The active tool.
 #[derive(Debug, Clone, Default)]
 pub struct Tool {
-    /// What the next click is asked for.
     pub pick: Option<Pick>,
     /// Whether the next click places the chosen inserted object.
     pub placing: bool,

@@ -12,7 +12,6 @@ pub struct History<T> {
 const DEPTH: usize = 200;
 
 impl<T: Clone + PartialEq> History<T> {
-    /// A history that begins with a value.
     pub fn starting_at(value: T) -> Self {
         Self {
             current: value,
@@ -35,12 +34,10 @@ impl<T: Clone + PartialEq> History<T> {
         self.future.clear();
     }
 
-    /// Whether there is a step to take back.
     pub fn can_undo(&self) -> bool {
         !self.past.is_empty()
     }
 
-    /// Whether there is a step to make again.
     pub fn can_redo(&self) -> bool {
         !self.future.is_empty()
     }

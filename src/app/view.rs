@@ -15,20 +15,17 @@ use crate::app::shown::Shown;
 use crate::app::tool::Tool;
 use crate::app::trade::TradeView;
 
-/// What is shown and how.
 #[derive(Default)]
 pub struct ViewState {
     /// Whose pictures are shown.
     pub shown: Shown,
     /// How pictures are looked at.
     pub look: Look,
-    /// Which pictures are compared.
     pub compare: Compare,
     /// Pictures made of the worker's.
     pub derived: Derived,
     /// What the panes of this pass show.
     pub needed: Needed,
-    /// The selected objects of the scene.
     pub selection: Selection,
     /// What a click does.
     pub tool: Tool,
@@ -44,22 +41,16 @@ pub struct ViewState {
 
 /// What a pane borrows.
 pub struct Parts<'a> {
-    /// What is shown.
     pub document: &'a Document,
-    /// How it is shown.
     pub view: &'a mut ViewState,
-    /// What the pane asks for.
     pub requests: &'a mut Requests,
 }
 
 /// How the panes of words and numbers are shown.
 #[derive(Default)]
 pub struct PanelsView {
-    /// The table of objects.
     pub objects: ObjectsTable,
-    /// Objects that are being added.
     pub adding: Adding,
-    /// The plot of the trade.
     pub trade: TradeView,
 }
 
@@ -98,13 +89,11 @@ pub struct LayoutRequest {
 }
 
 impl ViewState {
-    /// A picture of the shown view.
     pub fn drawn(&self, document: &Document, quantity: Quantity) -> Option<Drawn> {
         let sized = self.needed.composite;
         (self.derived).drawn(document, &self.shown, sized, quantity)
     }
 
-    /// Brings a pane to the front.
     pub fn bring_forward(&mut self, pane: Pane) {
         self.layout.front = Some(pane);
     }

@@ -190,14 +190,12 @@ impl eframe::App for Window {
         self.panes(ui, &mut requests);
         let (document, view) = (&self.app.document, &mut self.app.view);
         let requests = &mut requests;
-        files::show(
-            &ctx,
-            &mut Parts {
-                document,
-                view,
-                requests,
-            },
-        );
+        let parts = &mut Parts {
+            document,
+            view,
+            requests,
+        };
+        files::show(&ctx, parts);
         keys::show(&ctx, &mut view.shell.keys);
         palette::show(&ctx, &mut view.shell.palette, requests);
         self.app.jobs.notices.show(&ctx);

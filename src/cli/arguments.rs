@@ -36,9 +36,6 @@ pub struct Arguments {
 
 impl Arguments {
     /// Parses a command line; the first word is the program's name.
-    ///
-    /// # Errors
-    /// The command line is wrong, or asks for help or the version.
     pub fn from_words<W: Into<OsString> + Clone>(
         words: impl IntoIterator<Item = W>,
     ) -> std::result::Result<Self, clap::Error> {
@@ -87,7 +84,6 @@ pub enum Action {
     Study(StudyArguments),
 }
 
-/// `relit solve`.
 #[derive(Debug, Args)]
 pub struct SolveArguments {
     /// A capture, a scan of another program (imported first, into relit-out/<scan>/capture), or results to go on from

@@ -2,9 +2,8 @@
 
 use crate::cli::numbers::from_one;
 use crate::cli::object_values::ObjectValues;
-use crate::cli::options::{DenoiseOptions, DeviceOptions, Replace};
-use crate::cli::photographs::write_with_progress;
-use crate::cli::saved::SavedOptions;
+use crate::cli::options::{DenoiseOptions, DeviceOptions, Replace, SavedOptions};
+use crate::cli::progress::write_with_progress;
 use crate::error::{Error, Result};
 use crate::export::overwrite;
 use crate::say;
@@ -17,7 +16,6 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// `relit edit`.
 #[derive(Debug, Args)]
 pub struct EditArguments {
     #[command(flatten)]
@@ -45,9 +43,6 @@ pub struct EditArguments {
 }
 
 /// Edits objects of an estimate and writes it with new renders. Returns the exit code.
-///
-/// # Errors
-/// An object does not exist, or files cannot be read or written.
 pub fn edit(arguments: &EditArguments) -> Result<i32> {
     arguments.replace.apply();
     // Writing into the folder of the results would replace the estimate that was found.

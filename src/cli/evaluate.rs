@@ -1,6 +1,7 @@
 //! `relit evaluate`: the errors of an estimate against the truth.
 
 use crate::cli::numbers::threads;
+use crate::cli::options::use_threads;
 use crate::error::{Error, Result};
 use crate::say;
 use crate::session::command::{OpenOptions, Source};
@@ -10,7 +11,6 @@ use crate::study::evaluate::{Evaluation, evaluate as compare};
 use clap::Args;
 use std::path::PathBuf;
 
-/// `relit evaluate`.
 #[derive(Debug, Args)]
 pub struct EvaluateArguments {
     /// Folder that relit solve wrote
@@ -30,11 +30,8 @@ pub struct EvaluateArguments {
 }
 
 /// Prints the errors of an estimate.
-///
-/// # Errors
-/// The results or the truth cannot be read, or they belong to different objects.
 pub fn evaluate(arguments: &EvaluateArguments) -> Result<()> {
-    crate::cli::solve::use_threads(arguments.threads)?;
+    use_threads(arguments.threads)?;
     let saved = save::load(&arguments.dir)?;
     let options = OpenOptions {
         allow_outside: arguments.allow_outside,

@@ -1,8 +1,7 @@
 //! `relit export` and `relit demo`: files for other programs, and the built-in room as a capture.
 
 use crate::cli::numbers::{from_one, triple, whole, width};
-use crate::cli::options::Replace;
-use crate::cli::saved::SavedOptions;
+use crate::cli::options::{Replace, SavedOptions};
 use crate::error::{Error, Result};
 use crate::export::overwrite;
 use crate::export::scene::{self, Format};
@@ -14,7 +13,6 @@ use clap::{Args, ValueEnum};
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 
-/// `relit export`.
 #[derive(Debug, Args)]
 pub struct ExportArguments {
     #[command(flatten)]
@@ -73,7 +71,6 @@ fn check_extension(path: &Path, format: Format) -> Result<()> {
     Err(Error::usage(path.display(), problem, remedy))
 }
 
-/// `relit demo`.
 #[derive(Debug, Args)]
 pub struct DemoArguments {
     /// Folder to write the capture into: new, or empty
@@ -95,9 +92,6 @@ pub struct DemoArguments {
 }
 
 /// Writes one file for another program.
-///
-/// # Errors
-/// The results cannot be read, or the file cannot be written.
 pub fn export(arguments: &ExportArguments) -> Result<()> {
     arguments.replace.apply();
     check_extension(&arguments.out, arguments.format)?;
@@ -121,9 +115,6 @@ pub fn export(arguments: &ExportArguments) -> Result<()> {
 }
 
 /// Writes the built-in room with its truth as a capture.
-///
-/// # Errors
-/// The folder cannot be written.
 pub fn demo(arguments: &DemoArguments) -> Result<()> {
     arguments.replace.apply();
     let rendering = arguments.seed.map(|seed| Rendering {

@@ -8,13 +8,12 @@ use crate::cli::progress::bar;
 use crate::error::Result;
 use crate::export;
 use crate::say;
-use crate::session::path_kind::PathKind;
+use crate::session::command::PathKind;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 
-/// `relit import`.
 #[derive(Debug, Args)]
 pub struct ImportArguments {
     /// Folder of the scan
@@ -63,9 +62,6 @@ enum Applied {
 }
 
 /// Imports a scan as a capture and prints what was found and guessed.
-///
-/// # Errors
-/// The scan cannot be read, or the capture cannot be written.
 pub fn import(arguments: &ImportArguments) -> Result<()> {
     arguments.replace.apply();
     let named = |word: &String| Format::ALL.iter().find(|(name, _)| name == word);
@@ -95,9 +91,6 @@ pub fn import(arguments: &ImportArguments) -> Result<()> {
 
 /// Imports a scan that was given where a capture is expected, into the folder of its results, unless it was imported before.
 /// Returns the folder of the capture.
-///
-/// # Errors
-/// The folder holds no scan, or the capture cannot be written.
 pub fn beside_results(scan: &Path) -> Result<PathBuf> {
     let out = PathKind::imported(scan);
     let said = format!("{}: imported into {}", scan.display(), out.display());

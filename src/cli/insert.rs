@@ -1,9 +1,8 @@
 //! `relit insert`: objects in photographs, by differential rendering and naively.
 
 use crate::cli::numbers::{above_zero, degrees, from_one, pair, triple};
-use crate::cli::options::{DenoiseOptions, DeviceOptions, Replace};
-use crate::cli::photographs::write_with_progress;
-use crate::cli::saved::SavedOptions;
+use crate::cli::options::{DenoiseOptions, DeviceOptions, Replace, SavedOptions};
+use crate::cli::progress::write_with_progress;
 use crate::compose::object::surface::MaterialOverride;
 use crate::compose::placement::Placement;
 use crate::compose::write::with_ending;
@@ -14,7 +13,6 @@ use clap::{ArgAction, ArgMatches, Args, Command, FromArgMatches};
 use glam::{DVec2, DVec3, Vec3};
 use std::path::PathBuf;
 
-/// `relit insert`.
 #[derive(Debug, Args)]
 pub struct InsertArguments {
     #[command(flatten)]
@@ -42,9 +40,6 @@ pub struct InsertArguments {
 }
 
 /// Inserts objects and writes the composites. Returns the exit code.
-///
-/// # Errors
-/// The results or an object cannot be read, the frame does not exist, or a file cannot be written.
 pub fn insert(arguments: &InsertArguments) -> Result<i32> {
     arguments.replace.apply();
     let renderer = arguments.device.renderer()?;

@@ -20,9 +20,6 @@ pub struct Interrupt(Arc<AtomicUsize>);
 
 impl Interrupt {
     /// Installs the signal handlers.
-    ///
-    /// # Errors
-    /// A handler cannot be installed.
     pub fn listen() -> Result<Self> {
         let interrupt = Self::default();
         (interrupt.register())
@@ -46,7 +43,6 @@ impl Interrupt {
         Ok(())
     }
 
-    /// Whether termination was requested.
     pub fn requested(&self) -> bool {
         self.0.load(Ordering::SeqCst) != 0
     }

@@ -11,12 +11,8 @@ mod numbers;
 mod object_values;
 mod options;
 mod parameters;
-mod photographs;
 mod progress;
-pub mod reference;
 mod render;
-mod report;
-mod saved;
 mod solve;
 mod study;
 mod trade;
@@ -24,8 +20,7 @@ mod trade;
 use crate::error::{Error, Result};
 use crate::inverse::settings::Settings;
 use crate::say;
-use crate::session::command::{Source, Start};
-use crate::session::path_kind::PathKind;
+use crate::session::command::{PathKind, Source, Start};
 use crate::session::save;
 use arguments::{Action, Arguments};
 use clap::CommandFactory;
@@ -63,6 +58,19 @@ pub fn run(window: Option<Window>) -> i32 {
             error.exit_code()
         }
     }
+}
+
+/// The commands with their options, as the manual lists them.
+pub fn command() -> clap::Command {
+    Arguments::command()
+}
+
+/// Checks a command line, given as its words without `relit` in front.
+///
+/// # Errors
+/// The command line is wrong, or asks for help or the version.
+pub fn check(words: &[&str]) -> std::result::Result<(), clap::Error> {
+    Arguments::from_words(std::iter::once(&"relit").chain(words)).map(drop)
 }
 
 /// Runs the command. Returns the exit code: 0, or that of an interrupt.
@@ -138,7 +146,7 @@ fn open(arguments: Arguments, window: Option<Window>) -> Result<i32> {
         None => "this build has no window".to_owned(),
         Some(_) if !has_display() => "no display".to_owned(),
         Some(window) => {
-            solve::use_threads(options.threads)?;
+            options::use_threads(options.threads)?;
             let settings = options.parameters.over(&Settings::default());
             let start = match options.out.clone().filter(|_| options.resume) {
                 Some(results) => Start::Results(results),

@@ -3,15 +3,12 @@
 use glam::{DVec2, DVec3};
 use std::ops::RangeInclusive;
 
-/// A parsed value, or what is expected instead.
 type Parsed<T> = std::result::Result<T, String>;
 
-/// An integer ≥ 0.
 pub fn whole<T: TryFrom<u64>>(text: &str) -> Parsed<T> {
     within(text, 0..=u64::MAX).ok_or_else(|| "a whole number from 0 is wanted".to_owned())
 }
 
-/// An integer ≥ 1.
 pub fn from_one<T: TryFrom<u64>>(text: &str) -> Parsed<T> {
     within(text, 1..=u64::MAX).ok_or_else(|| "a whole number from 1 is wanted".to_owned())
 }
@@ -21,13 +18,11 @@ pub fn width(text: &str) -> Parsed<u32> {
     within(text, 16..=4096).ok_or_else(|| "a whole number from 16 to 4096 is wanted".to_owned())
 }
 
-/// A number of threads.
 pub fn threads(text: &str) -> Parsed<u16> {
     let range = 1..=u64::from(u16::MAX);
     within(text, range).ok_or_else(|| format!("a whole number from 1 to {} is wanted", u16::MAX))
 }
 
-/// A number of seeds.
 pub fn seeds(text: &str) -> Parsed<u64> {
     within(text, 1..=1000).ok_or_else(|| "a whole number from 1 to 1000 is wanted".to_owned())
 }
@@ -50,7 +45,6 @@ pub fn above_zero(text: &str) -> Parsed<f64> {
         .ok_or_else(|| "a number above 0 is wanted".to_owned())
 }
 
-/// An angle in degrees.
 pub fn degrees(text: &str) -> Parsed<f64> {
     finite(text).ok_or_else(|| "a number of degrees is wanted".to_owned())
 }
@@ -63,7 +57,6 @@ pub fn quarters(text: &str) -> Parsed<u8> {
     }
 }
 
-/// Two numbers separated by a comma.
 pub fn pair(text: &str) -> Parsed<DVec2> {
     match numbers(text).as_deref() {
         Some(&[x, y]) => Ok(DVec2::new(x, y)),
@@ -71,7 +64,6 @@ pub fn pair(text: &str) -> Parsed<DVec2> {
     }
 }
 
-/// Three numbers separated by commas.
 pub fn triple(text: &str) -> Parsed<DVec3> {
     match numbers(text).as_deref() {
         Some(&[x, y, z]) => Ok(DVec3::new(x, y, z)),

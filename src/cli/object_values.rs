@@ -29,9 +29,6 @@ const REFLECTANCE: &str = "a surface reflects between none and all of the light"
 
 impl ObjectValues {
     /// Adds the values to `edits` as changes of an estimate; where `known`, as values that a solve holds fixed.
-    ///
-    /// # Errors
-    /// An object does not exist, or a value is out of range.
     pub fn add(&self, scene: &Scene, edits: &mut Edits, known: bool) -> Result<()> {
         let mut set = |name: &str, set: &dyn Fn(&mut ObjectEdit)| {
             let object = find(scene, name)?;
@@ -85,13 +82,11 @@ fn find(scene: &Scene, name: &str) -> Result<usize> {
     })
 }
 
-/// Parses NAME=R,G,B.
 pub fn named_color(text: &str) -> std::result::Result<(String, Vec3), String> {
     let (name, color) = text.rsplit_once('=').ok_or("NAME=r,g,b is wanted")?;
     Ok((name.to_owned(), triple(color)?.as_vec3()))
 }
 
-/// Parses NAME=V.
 pub fn named_number(text: &str) -> std::result::Result<(String, f32), String> {
     let (name, value) = text.rsplit_once('=').ok_or("NAME=v is wanted")?;
     let number = value.parse::<f32>();

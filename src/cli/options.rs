@@ -8,15 +8,21 @@ use crate::cli::numbers::{above_zero, from_one, quarters, shift, threads, triple
 use crate::cli::parameters::{Parameters, duration};
 use crate::error::{Error, Result};
 use crate::export::overwrite;
+use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::render::{Device, Renderer};
 use crate::say;
-use crate::session::command::OpenOptions;
+use crate::session::command::{OpenOptions, Source};
+use crate::session::edits::Edits;
+use crate::session::open::open;
 use crate::session::save::pictures::Frames;
+use crate::session::save::{self, Saved};
+use crate::session::snapshot::OpenCapture;
 use crate::transport::denoise::Denoiser;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// Which pictures are denoised.
@@ -42,9 +48,6 @@ pub struct DenoiseOptions {
 
 impl DenoiseOptions {
     /// The denoiser of a picture; `None` for none. `to_look_at`: it is meant for viewing, not for measuring.
-    ///
-    /// # Errors
-    /// Open Image Denoise is asked for and is not installed.
     pub fn denoiser(self, to_look_at: bool) -> Result<Option<Denoiser>> {
         if self.denoise == Denoise::Oidn && Denoiser::best() != Denoiser::Oidn {
             let problem = "the library of Open Image Denoise 2 is not found";
@@ -71,9 +74,6 @@ pub struct DeviceOptions {
 
 impl DeviceOptions {
     /// Finds the renderer. Prints its name if it is a graphics card, or if the processor was asked for by name.
-    ///
-    /// # Errors
-    /// There is no such device.
     pub fn renderer(self) -> Result<Renderer> {
         let renderer = Renderer::find(self.device)?;
         match (renderer.card(), self.device) {
@@ -225,6 +225,76 @@ impl ReadOptions {
             ..before
         }
     }
+}
+
+/// Which results to load.
+#[derive(Debug, Args)]
+pub struct SavedOptions {
+    /// Folder that relit solve wrote
+    pub dir: PathBuf,
+    /// Where the capture is now, if it was moved
+    #[arg(long, value_name = "DIR")]
+    pub capture: Option<PathBuf>,
+    /// Number of threads [default: one per core]
+    #[arg(long, value_name = "N", value_parser = threads)]
+    pub threads: Option<u16>,
+    /// Let paths in the capture lead out of its folder; only for captures that you trust
+    #[arg(long)]
+    pub allow_outside: bool,
+}
+
+/// Results with their capture.
+pub struct Loaded {
+    pub saved: Saved,
+    pub capture: Arc<OpenCapture>,
+    pub found: Arc<Estimate>,
+    pub edits: Edits,
+    /// The estimate with the edits.
+    pub estimate: Arc<Estimate>,
+}
+
+impl SavedOptions {
+    /// Loads the results and opens their capture.
+    pub fn load(&self) -> Result<Loaded> {
+        use_threads(self.threads)?;
+        let saved = save::load(&self.dir)?;
+        let moved = self.capture.clone().map(Source::Folder);
+        let options = OpenOptions {
+            allow_outside: self.allow_outside,
+            ..saved.options.clone()
+        };
+        let capture = open(moved.as_ref().unwrap_or(&saved.source), &options)?;
+        let found = saved.estimate_for(&capture)?;
+        let edits = saved.edits_for(&capture)?;
+        Ok(Loaded {
+            saved,
+            capture: Arc::new(capture),
+            estimate: Arc::new(edits.apply(&found)),
+            found: Arc::new(found),
+            edits,
+        })
+    }
+}
+
+/// More threads per core than this gain nothing: an idle worker scans the list of all threads for work, which takes most of the
+/// time with a thousand of them.
+const MAX_THREADS_A_CORE: usize = 4;
+
+/// Sets the number of worker threads of the process. Warns if fewer are used than `threads`.
+pub fn use_threads(threads: Option<u16>) -> Result<()> {
+    let Some(threads) = threads.map(usize::from) else {
+        return Ok(());
+    };
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let used = threads.min(cores * MAX_THREADS_A_CORE);
+    if used < threads {
+        say::warning(format_args!(
+            "--threads {threads}: {used} are used, {MAX_THREADS_A_CORE} for each of the machine's {cores} cores"
+        ));
+    }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(used);
+    let built = pool.build_global();
+    built.map_err(|error| Error::new("--threads", error, "name fewer threads"))
 }
 
 /// Parses which frames get pictures: `all`, `none` or a count.

@@ -1,11 +1,16 @@
-//! Progress of a solve: a bar on a terminal, otherwise a line every few seconds.
+//! Progress of a solve: a bar on a terminal, otherwise a line every few seconds; and of photographs that are written.
 
+use crate::cli::interrupt::Interrupt;
+use crate::error::Result;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{LossPoint, Progress};
+use crate::render::Renderer;
 use crate::say;
+use crate::session::photographs::Photographs;
 use crate::session::rates::Rates;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 /// Time between two lines without a terminal.
@@ -26,10 +31,9 @@ pub fn bar(template: &str) -> ProgressBar {
         .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }
 
-/// Shows progress on stderr.
 #[derive(Debug)]
 pub struct Meter {
-    bar: Option<ProgressBar>,
+    bar: ProgressBar,
     shown: Option<Instant>,
     phase: String,
     rates: Rates,
@@ -38,9 +42,8 @@ pub struct Meter {
 impl Meter {
     /// A bar if stderr is a terminal, else lines.
     pub fn new() -> Self {
-        let is_terminal = std::io::stderr().is_terminal();
         Self {
-            bar: is_terminal.then(|| bar("{bar:24} {msg}")),
+            bar: bar("{bar:24} {msg}"),
             shown: None,
             phase: String::new(),
             rates: Rates::default(),
@@ -50,7 +53,7 @@ impl Meter {
     /// Shows the progress if the last update is old enough or the phase has changed.
     pub fn show(&mut self, progress: &Progress, settings: &Settings) {
         self.rates.note(progress);
-        let pause = if self.bar.is_some() { FRAME } else { LINE };
+        let pause = if self.bar.is_hidden() { LINE } else { FRAME };
         let due = self.shown.is_none_or(|at| at.elapsed() >= pause);
         if !due && progress.phase == self.phase {
             return;
@@ -58,34 +61,26 @@ impl Meter {
         self.shown = Some(Instant::now());
         self.phase.clone_from(&progress.phase);
         let line = self.line(progress, settings);
-        match &self.bar {
-            Some(bar) => {
-                let by_time = settings.time > 0.0;
-                let done = match progress.fraction {
-                    _ if by_time => progress.seconds / settings.time,
-                    Some(fraction) => f64::from(fraction),
-                    None => 0.0,
-                };
-                bar.set_position((done.clamp(0.0, 1.0) * LENGTH as f64) as u64);
-                bar.set_message(line);
-            }
-            None => say::note(line),
+        if self.bar.is_hidden() {
+            return say::note(line);
         }
+        let done = match progress.fraction {
+            _ if settings.time > 0.0 => progress.seconds / settings.time,
+            Some(fraction) => f64::from(fraction),
+            None => 0.0,
+        };
+        (self.bar).set_position((done.clamp(0.0, 1.0) * LENGTH as f64) as u64);
+        self.bar.set_message(line);
     }
 
     /// Prints a line without breaking the bar.
     pub fn say(&self, line: &str) {
-        match &self.bar {
-            Some(bar) => bar.suspend(|| say::note(line)),
-            None => say::note(line),
-        }
+        self.bar.suspend(|| say::note(line));
     }
 
     /// Removes the bar, so that other output can follow.
     pub fn finish(&self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
-        }
+        self.bar.finish_and_clear();
     }
 
     fn line(&self, progress: &Progress, settings: &Settings) -> String {
@@ -112,4 +107,35 @@ impl Meter {
         }
         line
     }
+}
+
+/// Writes photographs with a progress bar and prints the paths of their files; Ctrl-C stops after the last complete one. Returns
+/// the exit code.
+pub fn write_with_progress(
+    work: &Photographs,
+    renderer: &Renderer,
+    prefix: &dyn Fn(usize) -> PathBuf,
+) -> Result<i32> {
+    let interrupt = Interrupt::listen()?;
+    let bar = bar("{bar:24} photograph {msg}, {eta} left");
+    let written = work.write_with(renderer, prefix, &|doing| {
+        bar.set_position((f64::from(doing.fraction) * LENGTH as f64) as u64);
+        bar.set_message(format!("{:03}", doing.frame));
+        !interrupt.requested()
+    });
+    bar.finish_and_clear();
+    let written = written?;
+    for warning in &written.warnings {
+        say::warning(warning);
+    }
+    let (done, all) = (written.photographs, work.frames.len());
+    if done < all {
+        say::note(format_args!(
+            "interrupted after {done} of {all} photographs"
+        ));
+    }
+    for path in &written.files {
+        say::line(path.display());
+    }
+    Ok(interrupt.exit_code())
 }

@@ -2,8 +2,7 @@
 
 use crate::capture::read::camera_file;
 use crate::cli::numbers::{from_one, whole};
-use crate::cli::options::{DenoiseOptions, DeviceOptions, Replace};
-use crate::cli::saved::SavedOptions;
+use crate::cli::options::{DenoiseOptions, DeviceOptions, Replace, SavedOptions};
 use crate::error::{Error, Result};
 use crate::export::exr::{Precision, write_rgb};
 use crate::export::light_layers;
@@ -19,7 +18,6 @@ use clap::Args;
 use glam::Vec3;
 use std::path::PathBuf;
 
-/// `relit render`.
 #[derive(Debug, Args)]
 pub struct RenderArguments {
     #[command(flatten)]
@@ -54,9 +52,6 @@ pub struct RenderArguments {
 }
 
 /// Renders one picture.
-///
-/// # Errors
-/// The results or the camera cannot be read, or the picture cannot be written.
 pub fn render(arguments: &RenderArguments) -> Result<()> {
     let ending = arguments.out.extension().and_then(|e| e.to_str());
     let wrong = |problem, remedy| Err(Error::usage(arguments.out.display(), problem, remedy));

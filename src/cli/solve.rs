@@ -1,22 +1,24 @@
-//! `relit solve`: a headless solve with progress; an interrupt saves the estimate reached so far.
+//! `relit solve`: a headless solve with progress and a table at its end; an interrupt saves the estimate reached so far.
 
 use crate::cli::interrupt::Interrupt;
 use crate::cli::object_values::ObjectValues;
-use crate::cli::options::SolveOptions;
+use crate::cli::options::{SolveOptions, use_threads};
 use crate::cli::progress::Meter;
-use crate::cli::report;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::export::overwrite::CaptureId;
-use crate::inverse::estimate::Estimate;
+use crate::inverse::estimate::{Estimate, ObjectEstimate};
 use crate::inverse::known::Known;
 use crate::inverse::settings::Settings;
-use crate::inverse::solver::{Checkpoint, Control, Observer, Progress};
+use crate::inverse::solver::{Checkpoint, Control, Observer, Progress, Termination};
 use crate::say;
+use crate::scene::Scene;
 use crate::session::command::Source;
 use crate::session::edits::Edits;
 use crate::session::open::open;
 use crate::session::save::staging::Staging;
 use crate::session::save::{self, Results};
+use glam::Vec3;
+use std::borrow::Cow;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -25,9 +27,6 @@ use std::time::{Duration, Instant};
 const NOTHING_TO_SAVE: &str = "interrupted before there was anything to save";
 
 /// Solves a source and writes the results. Returns the exit code.
-///
-/// # Errors
-/// The capture cannot be read or solved, or the results cannot be written.
 pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> Result<i32> {
     let started = Instant::now();
     options.replace.apply();
@@ -129,9 +128,9 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
     for warning in &results.progress.warnings {
         say::warning(warning);
     }
-    say::table(&report::objects(&capture.scene, &results.estimate));
+    say::table(&objects(&capture.scene, &results.estimate));
     say::line("");
-    say::line(report::ending(&results.progress, solution.termination));
+    say::line(ending(&results.progress, solution.termination));
     say::line(format_args!("results in {}", folder.display()));
     Ok(interrupt.exit_code())
 }
@@ -180,26 +179,74 @@ impl Observer for Watch<'_> {
     }
 }
 
-/// More threads per core than this gain nothing: an idle worker scans the list of all threads for work, which takes most of the
-/// time with a thousand of them.
-const MAX_THREADS_A_CORE: usize = 4;
+/// Most rows printed; report.json has all.
+const ROWS: usize = 24;
 
-/// Sets the number of worker threads of the process. Warns if fewer are used than `threads`.
-///
-/// # Errors
-/// The threads cannot be started.
-pub fn use_threads(threads: Option<u16>) -> Result<()> {
-    let Some(threads) = threads.map(usize::from) else {
-        return Ok(());
-    };
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let used = threads.min(cores * MAX_THREADS_A_CORE);
-    if used < threads {
-        say::warning(format_args!(
-            "--threads {threads}: {used} are used, {MAX_THREADS_A_CORE} for each of the machine's {cores} cores"
-        ));
+/// Table of objects with standard errors, sorted by emission, then by the number of pixels that see them.
+fn objects(scene: &Scene, estimate: &Estimate) -> String {
+    let names = scene.objects.iter().map(|o| say::plain(&o.name));
+    let mut rows: Vec<(Cow<str>, &ObjectEstimate)> = names.zip(&estimate.objects).collect();
+    rows.sort_by(|(_, a), (_, b)| {
+        let brightness = |o: &ObjectEstimate| o.emission.element_sum();
+        brightness(b)
+            .total_cmp(&brightness(a))
+            .then(b.seen_pixels.cmp(&a.seen_pixels))
+    });
+    let shown = rows.len().min(ROWS);
+    let widths = rows[..shown].iter().map(|(name, _)| name.chars().count());
+    let width = widths.max().unwrap_or(0).max(6);
+    let mut text = format!(
+        "{:width$}  {:>24}  {:>9}  {:>17}  {:>7}  {:>8}\n",
+        "object", "emission", "±", "albedo", "±", "pixels"
+    );
+    for (name, object) in &rows[..shown] {
+        let [r, g, b] = object.emission.to_array();
+        let emission = format!("{r:.4} {g:.4} {b:.4}");
+        let [r, g, b] = object.albedo.to_array();
+        let albedo = match object.albedo_identifiable {
+            true => format!("{r:.3} {g:.3} {b:.3}"),
+            false => "not determined".to_owned(),
+        };
+        let emission_error = error(object.emission_stderr, 4);
+        let (albedo_error, pixels) = (error(object.albedo_stderr, 3), object.seen_pixels);
+        text += &format!("{name:width$}  {emission:>24}  {emission_error:>9}  ");
+        text += &format!("{albedo:>17}  {albedo_error:>7}  {pixels:>8}\n");
     }
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(used);
-    let built = pool.build_global();
-    built.map_err(|error| Error::new("--threads", error, "name fewer threads"))
+    if estimate.common_error > 0.0 {
+        text += &format!(
+            "one factor of all albedos together is known to ±{:.0} %; their ratios are known better\n",
+            estimate.common_error * 100.0
+        );
+    }
+    if rows.len() > shown {
+        text += &format!("… and {} more in report.json\n", rows.len() - shown);
+    }
+    text
+}
+
+fn error(stderr: Vec3, digits: usize) -> String {
+    let worst = stderr.max_element();
+    // f32::MAX stands for an unknown error.
+    match worst < f32::MAX {
+        true => format!("{worst:.digits$}"),
+        false => "?".to_owned(),
+    }
+}
+
+/// One line on why and when the solve ended.
+fn ending(progress: &Progress, termination: Termination) -> String {
+    let why = match termination {
+        Termination::Converged => "converged",
+        Termination::Target => "the target error is reached",
+        Termination::Time => "the time is up",
+        Termination::Steps => "the steps are done",
+        Termination::Cancelled => "stopped",
+        Termination::Diverged => "diverged; this is the last finite estimate",
+    };
+    format!(
+        "{why} after {:.1} s, {} iterations, {:.1} million rays",
+        progress.seconds,
+        progress.iterations,
+        progress.rays as f64 * 1e-6
+    )
 }

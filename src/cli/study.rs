@@ -1,8 +1,7 @@
 //! `relit study`: the experiments of the paper.
 
 use crate::cli::numbers::{from_one, seeds, threads};
-use crate::cli::options::{ReadOptions, Replace};
-use crate::cli::solve::use_threads;
+use crate::cli::options::{ReadOptions, Replace, use_threads};
 use crate::cli::trade::time;
 use crate::error::{Error, Result};
 use crate::inverse::settings::{Preset, Settings};
@@ -17,14 +16,12 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Selects all studies.
 const ALL: &str = "all";
 /// Width and height of the photographs that a chair is inserted into; of those of `relit trade` it may cover 35 pixels only.
 const SIZE: [u32; 2] = [240, 180];
 /// Default number of seeds with `--quick`.
 const QUICK_SEEDS: u64 = 2;
 
-/// `relit study`.
 #[derive(Debug, Args)]
 pub struct StudyArguments {
     /// The study
@@ -72,9 +69,6 @@ fn names() -> PossibleValuesParser {
 }
 
 /// Runs the studies and writes the findings of each as soon as it is done.
-///
-/// # Errors
-/// The capture cannot be read, a solve cannot start, or a file cannot be written.
 pub fn study(arguments: &StudyArguments) -> Result<()> {
     arguments.replace.apply();
     use_threads(arguments.threads)?;
@@ -109,11 +103,7 @@ pub fn study(arguments: &StudyArguments) -> Result<()> {
     Ok(())
 }
 
-/// Runs the study `insertion` over generated rooms that insertion-FAMILY.csv lacks, and prints the decision over all
-/// rooms.
-///
-/// # Errors
-/// A room cannot be generated or solved, or the table cannot be written.
+/// Runs the study `insertion` over generated rooms that insertion-FAMILY.csv lacks, and prints the decision over all rooms.
 fn insertions(arguments: &StudyArguments, rooms: u32, family: &str) -> Result<()> {
     let mut presets = Preset::ALL.iter().copied();
     let preset = presets.find(|preset| preset.word() == arguments.preset);

@@ -2,9 +2,8 @@
 
 use crate::cli::interrupt::Interrupt;
 use crate::cli::numbers::{from_one, threads, whole};
-use crate::cli::options::{ReadOptions, Replace};
+use crate::cli::options::{ReadOptions, Replace, use_threads};
 use crate::cli::parameters::duration;
-use crate::cli::solve::use_threads;
 use crate::error::{Error, Result};
 use crate::inverse::settings::{Preset, Settings};
 use crate::room::generated::Family;
@@ -25,7 +24,6 @@ const ALL: &str = "all";
 /// Default time for all solves of curves.
 const DEFAULT_TIME: Duration = Duration::from_secs(5 * 60);
 
-/// `relit trade`.
 #[derive(Debug, Args)]
 pub struct TradeArguments {
     /// Folder of the capture; the built-in room if none is named
@@ -93,9 +91,6 @@ impl TradeArguments {
 
 /// Measures and prints what was found. Writes trade.csv, trade.png and trade.json, or for families rooms.csv, rooms.png and
 /// rooms.json. Returns the exit code.
-///
-/// # Errors
-/// The capture cannot be read or solved, or the results cannot be written.
 pub fn trade(arguments: &TradeArguments) -> Result<i32> {
     arguments.replace.apply();
     use_threads(arguments.threads)?;
@@ -141,9 +136,6 @@ pub fn trade(arguments: &TradeArguments) -> Result<i32> {
 
 /// Solves generated rooms of the named families. Starts no further room after the time. Writes rooms.csv, rooms.json and
 /// rooms.png, and prints a table.
-///
-/// # Errors
-/// The results cannot be written, or a room could not be solved.
 fn of_families(
     arguments: &TradeArguments,
     out: &Path,

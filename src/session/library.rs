@@ -21,7 +21,6 @@ use std::sync::Arc;
 /// An insertion into one frame, with its naive variants.
 #[derive(Debug)]
 pub struct Inserted {
-    /// The composite, refined progressively.
     pub composite: Composite,
     /// Pasted objects, lit by harmonics of the photographs.
     pub naive: Pasted,
@@ -49,9 +48,6 @@ struct Taken {
 
 impl Library {
     /// The object in a file; each file is read once.
-    ///
-    /// # Errors
-    /// The file cannot be read.
     pub fn model(&mut self, path: &PathBuf) -> Result<Arc<ObjectModel>> {
         if let Some(model) = self.models.get(path) {
             return Ok(model.clone());
@@ -73,9 +69,6 @@ impl Library {
     }
 
     /// The backdrop of a frame at a size, with the photograph's blur and grain if `soft`. Cached for the shown frame.
-    ///
-    /// # Errors
-    /// The frame does not exist, or its file cannot be read again.
     pub(super) fn backdrop(
         &mut self,
         capture: &OpenCapture,

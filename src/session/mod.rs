@@ -3,21 +3,20 @@
 
 pub mod command;
 pub mod edits;
-pub mod inbox;
+pub(crate) mod inbox;
 pub mod insertion;
-pub mod library;
+pub(crate) mod library;
 pub mod light;
 pub mod open;
-pub mod open_capture;
-pub mod painter;
-pub mod path_kind;
+pub(crate) mod open_capture;
+pub(crate) mod painter;
 pub mod photographs;
-pub mod rates;
+pub(crate) mod rates;
 pub mod save;
-pub mod slot;
+pub(crate) mod slot;
 pub mod snapshot;
 pub mod store;
-pub mod view;
+pub(crate) mod view;
 pub mod worker;
 
 pub use worker::Session;

@@ -110,10 +110,7 @@ impl OpenCapture {
     }
 
     /// Refuses a capture whose photographs clearly do not show the mesh from their poses.
-    ///
-    /// # Errors
-    /// The capture is read wrongly; the remedy says how to read it.
-    pub fn aligned(self) -> Result<Self> {
+    pub(crate) fn aligned(self) -> Result<Self> {
         let alignment = self.alignment.as_ref();
         let error = alignment.and_then(|a| a.error(&self.name, &self.options.reading));
         error.map_or(Ok(self), Err)

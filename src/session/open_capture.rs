@@ -57,10 +57,11 @@ impl OpenCapture {
 
     /// A frame's camera and photograph with a long side of at most `long_side` pixels; read again from the file if the working
     /// resolution is lower.
-    ///
-    /// # Errors
-    /// The frame does not exist, or the file cannot be read again.
-    pub fn frame_at(&self, index: usize, long_side: u32) -> Result<(Camera, Arc<Photograph>)> {
+    pub(crate) fn frame_at(
+        &self,
+        index: usize,
+        long_side: u32,
+    ) -> Result<(Camera, Arc<Photograph>)> {
         let size = |camera: &Camera| camera.intrinsics.width.max(camera.intrinsics.height);
         let (camera, photograph) = self.frame(index)?;
         let (mut camera, mut photograph) = (camera.clone(), photograph.clone());
@@ -89,10 +90,7 @@ impl OpenCapture {
     }
 
     /// A frame's camera at the size of its photograph's file.
-    ///
-    /// # Errors
-    /// The frame does not exist.
-    pub fn full_camera(&self, index: usize) -> Result<Camera> {
+    pub(crate) fn full_camera(&self, index: usize) -> Result<Camera> {
         let frame = self.full_frame(index)?;
         let origin = self.scene.origin;
         Ok(Camera::new(&frame.intrinsics, &frame.pose, origin))
@@ -108,10 +106,7 @@ impl OpenCapture {
 
     /// A frame's photograph, box-filtered to a camera's size, and the exposure for its display: its own if it
     /// saturates, else the one that maps the 99th percentile to 1.
-    ///
-    /// # Errors
-    /// As [`OpenCapture::full_photograph`].
-    pub fn sized_photograph(&self, index: usize, camera: &Camera) -> Result<(Picture, f32)> {
+    pub(crate) fn sized_photograph(&self, index: usize, camera: &Camera) -> Result<(Picture, f32)> {
         let photograph = self.full_photograph(index)?;
         let whole = photograph.picture();
         let k = &camera.intrinsics;
@@ -141,10 +136,7 @@ impl OpenCapture {
     }
 
     /// Measures estimates by the truth if there is one, else by held-out pixels.
-    ///
-    /// # Errors
-    /// The truth is broken.
-    pub fn metric(&self) -> Result<Metric> {
+    pub(crate) fn metric(&self) -> Result<Metric> {
         let truth = match &self.source {
             Source::BuiltInRoom => Room::new().truth(STORED.size)?,
             Source::Folder(folder) if folder.join("truth.json").is_file() => Truth::read(folder)?,
@@ -155,10 +147,7 @@ impl OpenCapture {
     }
 
     /// The capture as a subject of studies.
-    ///
-    /// # Errors
-    /// The truth is broken.
-    pub fn subject(&self) -> Result<Subject> {
+    pub(crate) fn subject(&self) -> Result<Subject> {
         Ok(Subject {
             name: self.name.clone(),
             capture: self.capture.clone(),

@@ -11,7 +11,7 @@ use crate::gpu::{self, Tracer};
 use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::render::{Renderer, warn_card_failed};
-use crate::session::library::{Inserted, Library};
+use crate::session::library::Library;
 use crate::session::light::path_options;
 use crate::session::open_capture::OpenCapture;
 use crate::transport::denoise::Denoiser;
@@ -79,10 +79,7 @@ impl Photographs {
     }
 
     /// [`Photographs::write`] with a renderer.
-    ///
-    /// # Errors
-    /// As [`Photographs::write`].
-    pub fn write_with(
+    pub(crate) fn write_with(
         &self,
         renderer: &Renderer,
         prefix: &dyn Fn(usize) -> PathBuf,
@@ -208,40 +205,36 @@ impl Photographs {
         prefix: &Path,
         go_on: &dyn Fn(f32) -> bool,
     ) -> Result<Option<(Vec<PathBuf>, bool)>> {
+        let (seed, options) = (self.settings.seed, path_options(&self.settings));
+        let (capture, edited, objects) = (&self.capture, &self.edited, objects.to_vec());
+        let inserted = library.insert(capture, edited, backdrop.clone(), objects, &options, seed);
         // The denoiser needs two independent halves.
+        let mut halves = vec![inserted.composite];
+        if self.denoise.is_some() {
+            halves.push(halves[0].with_seed(seed.wrapping_add(1)));
+        }
         let parts = self.halves();
         let samples = self.even_samples() / parts;
-        let mut made: Vec<Inserted> = Vec::new();
-        for part in 0..parts {
-            let mut inserted = library.insert(
-                &self.capture,
-                &self.edited,
-                backdrop.clone(),
-                objects.to_vec(),
-                &path_options(&self.settings),
-                self.settings.seed.wrapping_add(u64::from(part)),
-            );
+        for (part, half) in halves.iter_mut().enumerate() {
             let step = step(tracer.is_some());
             for before in (0..samples).step_by(step as usize) {
                 let pass = (before + step).min(samples);
                 let done = part as f32 + before as f32 / samples as f32;
                 let go_on = || go_on(done / parts as f32);
-                let composite = &mut inserted.composite;
-                let done = on_card(composite, tracer, |c, card| c.refine_on(card, pass, go_on));
-                if !done.unwrap_or_else(|| composite.refine_to(pass, go_on)) {
+                let done = on_card(half, tracer, |half, card| half.refine_on(card, pass, go_on));
+                if !done.unwrap_or_else(|| half.refine_to(pass, go_on)) {
                     return Ok(None);
                 }
             }
-            made.push(inserted);
         }
         let denoiser = self.denoise.unwrap_or(Denoiser::Builtin);
-        let (composite, layers) = match &made[..] {
-            [a, b] => denoised([&a.composite, &b.composite], denoiser),
-            made => (made[0].composite.composite(), made[0].composite.layers()),
+        let (composite, layers) = match &halves[..] {
+            [a, b] => denoised([a, b], denoiser),
+            halves => (halves[0].composite(), halves[0].layers()),
         };
         let behind = &backdrop.photograph;
-        let naive = made[0].naive.over(behind);
-        let naive_estimate = made[0].naive_estimate.over(behind);
+        let naive = inserted.naive.over(behind);
+        let naive_estimate = inserted.naive_estimate.over(behind);
         let is_seen = layers.alpha.iter().any(|&alpha| alpha > 0.0);
         let results = (&composite, layers);
         let files = write_insertion(prefix, &backdrop, results, &naive, &naive_estimate)?;

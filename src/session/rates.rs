@@ -42,12 +42,10 @@ impl Rates {
         }
     }
 
-    /// Iterations a second.
     pub fn iterations(&self) -> f64 {
         self.rate(|mark| mark.iterations)
     }
 
-    /// Rays a second.
     pub fn rays(&self) -> f64 {
         self.rate(|mark| mark.rays)
     }

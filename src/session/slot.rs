@@ -24,11 +24,8 @@ struct Parts {
 /// The painter's pictures.
 #[derive(Debug, Clone, Default)]
 pub struct Pictures {
-    /// The capture that they show.
     pub capture: Option<Arc<OpenCapture>>,
-    /// Pictures of the requested view.
     pub view: Option<Arc<View>>,
-    /// Composites of the requested frame.
     pub insertion: Option<Arc<Insertion>>,
 }
 
@@ -51,7 +48,6 @@ impl Slot {
         Arc::make_mut(&mut self.lock().events).push(Event { level, message });
     }
 
-    /// The newest pictures.
     pub fn pictures(&self) -> Pictures {
         self.lock().pictures.clone()
     }

@@ -75,7 +75,7 @@ pub struct Kept {
 
 /// Saves and lists sessions.
 #[derive(Debug, Default)]
-pub struct SessionStore {
+pub(crate) struct SessionStore {
     base: Option<PathBuf>,
     capture: Option<PathBuf>,
     /// Folder and lock of the open session, once it has been saved.
@@ -147,9 +147,6 @@ impl SessionStore {
     }
 
     /// Saves the open session, with a thumbnail and its exposure. After a failure nothing more is saved.
-    ///
-    /// # Errors
-    /// The folder cannot be written.
     pub fn write(
         &mut self,
         results: &Results,
@@ -176,9 +173,6 @@ impl SessionStore {
     }
 
     /// Deletes a session, unless it is open.
-    ///
-    /// # Errors
-    /// The session is open, or cannot be deleted.
     pub fn remove(&mut self, folder: &Path) -> Result<()> {
         let is_kept = self.kept.iter().any(|kept| kept.folder == folder);
         if !is_kept || lock(folder).is_none() {

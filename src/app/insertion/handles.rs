@@ -107,10 +107,8 @@ impl Insertions {
 
     /// The scale that brings the handle above an object to where the ray passes the axis through its foot.
     fn resized(&self, object: &Placement, scene: &Scene, ray: &Ray) -> Option<f64> {
-        let (foot, top) = (
-            foot(object, scene)?,
-            self.place(Kind::Scale, object, scene)?,
-        );
+        let foot = foot(object, scene)?;
+        let top = self.place(Kind::Scale, object, scene)?;
         let wanted = height_of(foot, scene.up, ray)?;
         let factor = f64::from(wanted / top.distance(foot));
         let scale = (object.scale * factor).clamp(SCALES.0, SCALES.1);
@@ -119,10 +117,8 @@ impl Insertions {
 
     /// The angle that turns an object's handle to where the ray meets the ground plane that it stands on, degrees.
     fn turned(&self, object: &Placement, scene: &Scene, ray: &Ray) -> Option<f64> {
-        let (foot, handle) = (
-            foot(object, scene)?,
-            self.place(Kind::Rotate, object, scene)?,
-        );
+        let foot = foot(object, scene)?;
+        let handle = self.place(Kind::Rotate, object, scene)?;
         let aim = on_plane(foot, scene.up, ray)? - foot;
         let back = Quat::from_axis_angle(scene.up, -object.rotate.to_radians() as f32);
         let unturned = back * (handle - foot);

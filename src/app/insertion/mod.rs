@@ -10,9 +10,7 @@ use models::Models;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-/// All inserted objects.
 pub struct Insertions {
-    /// The objects, in the order in which they were added.
     pub objects: Vec<Placement>,
     /// The one that is edited.
     pub chosen: Option<usize>,
@@ -36,11 +34,9 @@ impl Default for Insertions {
 /// Objects that are being added: the path as typed, and files that are read first.
 #[derive(Debug, Default)]
 pub struct Adding {
-    /// The path as typed.
     pub path: String,
     /// Whether the field for a path is to take the keys.
     pub typing: bool,
-    /// Files that are read before they join the objects.
     pub wanted: Vec<PathBuf>,
     /// Why the last file did not join them.
     pub problem: Option<String>,
@@ -75,7 +71,6 @@ impl Insertions {
         self.chosen = self.objects.len().checked_sub(1);
     }
 
-    /// The chosen object.
     pub fn chosen(&self) -> Option<(usize, &Placement)> {
         let index = self.chosen?;
         Some((index, self.objects.get(index)?))
@@ -106,7 +101,6 @@ impl Insertions {
         self.chosen = self.objects.len().checked_sub(1);
     }
 
-    /// The objects that are shown.
     pub fn visible(&self) -> Vec<Placement> {
         let visible = self.objects.iter().filter(|object| !object.hidden);
         visible.cloned().collect()

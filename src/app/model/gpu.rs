@@ -18,11 +18,9 @@ pub struct SceneUniform {
     pub clip_from_scene: [[f32; 4]; 4],
     /// Centre of projection.
     pub eye: [f32; 3],
-    /// Factor on radiance.
     pub exposure: f32,
     /// Colour of the selected object.
     pub accent: [f32; 4],
-    /// Behind the mesh.
     pub background: [f32; 4],
     /// Index of the selected object, or −1.
     pub selected: f32,
@@ -36,11 +34,8 @@ pub struct SceneUniform {
 
 /// Draws the 3D view.
 pub struct MeshPaint {
-    /// Faces.
     pub surface: Arc<Surface>,
-    /// Their colours.
     pub colors: Colors,
-    /// Camera and shading.
     pub uniform: SceneUniform,
     /// Size in pixels.
     pub size: [u32; 2],
@@ -69,7 +64,6 @@ const COLUMNS: u32 = 2048;
 const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
-/// Prepares drawing meshes.
 pub fn install(render_state: &RenderState) {
     let device = &render_state.device;
     let shader = device.create_shader_module(wgpu::include_wgsl!("mesh.wgsl"));
@@ -87,10 +81,8 @@ pub fn install(render_state: &RenderState) {
     };
     let (names, corners) = (["vertex", "fragment"], [Some(corners)]);
     let mesh_pipeline = pipeline(device, &shader, names, &corners, Some(depth), COLOR);
-    let (names, format) = (
-        ["screen_vertex", "screen_fragment"],
-        render_state.target_format,
-    );
+    let names = ["screen_vertex", "screen_fragment"];
+    let format = render_state.target_format;
     let screen_pipeline = pipeline(device, &shader, names, &[], None, format);
     let uniform = uniform_buffer::<SceneUniform>(device);
     let mut renderer = render_state.renderer.write();

@@ -1,13 +1,13 @@
 //! The 3D view: the mesh under a camera that orbits and flies, with the photographs' cameras around it.
 
 pub mod coloring;
-pub mod gpu;
-pub mod lasso;
-pub mod orbit;
-pub mod overlay;
-pub mod pane;
-pub mod surface;
-pub mod view;
+pub(super) mod gpu;
+pub(super) mod lasso;
+pub(super) mod orbit;
+pub(super) mod overlay;
+pub(super) mod pane;
+pub(super) mod surface;
+pub(super) mod view;
 
 /// What tests of the 3D view share.
 #[cfg(test)]

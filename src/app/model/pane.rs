@@ -17,7 +17,6 @@ use crate::scene::geometry::{Hit, Ray};
 use egui::{Key, PointerButton, Rect, Response, Role, Sense, Ui};
 use glam::{Vec2, Vec3};
 
-/// Draws the pane.
 pub fn pane(ui: &mut Ui, parts: &mut Parts<'_>) {
     theme::strip(ui, |ui| controls(ui, &mut parts.view.model));
     let rect = ui.available_rect_before_wrap();

@@ -11,23 +11,18 @@ use crate::session::snapshot::OpenCapture;
 use glam::Vec3;
 use std::sync::Arc;
 
-/// Colours of all faces.
 pub type Colors = Arc<Vec<[f32; 4]>>;
 
 /// Faces, and the radiance of each in the photographs once that is known.
 type Made = (Arc<Surface>, Vec<Option<Vec3>>);
 
-/// The state of the 3D view.
 pub struct ModelView {
-    /// Its camera.
     pub orbit: Orbit,
-    /// What faces are coloured by.
     pub coloring: Coloring,
     /// Whether faces seen from behind are left out, so that one can look into a room.
     pub cull: bool,
     /// Whether the photographs' cameras are drawn.
     pub cameras: bool,
-    /// The line that is being drawn.
     pub lasso: Lasso,
     made: Option<Made>,
     making: Option<Task<Made, ()>>,

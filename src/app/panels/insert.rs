@@ -15,7 +15,6 @@ use egui::{Button, Checkbox, DragValue, Grid, Role, Ui};
 use glam::DVec3;
 use std::path::PathBuf;
 
-/// Draws the pane.
 pub fn pane(ui: &mut Ui, parts: &mut Parts<'_>, scene: &Scene) {
     let (insertions, requests) = (&parts.document.insertions, &mut *parts.requests);
     let adding = &mut parts.view.panels.adding;

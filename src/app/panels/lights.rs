@@ -15,7 +15,6 @@ use egui::{Button, Checkbox, DragValue, Grid, Role, Slider, SliderClamping, Ui, 
 /// The strength at the end of a slider; a larger one can be typed.
 const MAX: f32 = 4.0;
 
-/// Draws the pane.
 pub fn pane(ui: &mut Ui, parts: &mut Parts<'_>, scene: &Scene) {
     let (document, requests) = (parts.document, &mut *parts.requests);
     let camera = parts.view.shown.camera(document);

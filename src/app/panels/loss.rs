@@ -9,7 +9,6 @@ use egui_plot::{Line, LineStyle, Plot, PlotPoints, Points, VLine};
 /// Points drawn of a curve at most.
 const POINTS: usize = 2000;
 
-/// Draws the pane.
 pub fn pane(ui: &mut Ui, progress: &Progress) {
     let tokens = theme::tokens(ui);
     if progress.losses.is_empty() && progress.fits.is_empty() {

@@ -16,7 +16,6 @@ use glam::Vec3;
 
 const CHANNELS: [&str; 3] = ["red", "green", "blue"];
 
-/// Draws the pane.
 pub fn pane(ui: &mut Ui, parts: &mut Parts<'_>, scene: &Scene) {
     let (document, requests) = (parts.document, &mut *parts.requests);
     let selected = parts.view.selection.object;

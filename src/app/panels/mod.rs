@@ -1,11 +1,11 @@
 //! Panes of words and numbers.
 
-pub mod insert;
-pub mod lights;
-pub mod loss;
-pub mod material;
+pub(super) mod insert;
+pub(super) mod lights;
+pub(super) mod loss;
+pub(super) mod material;
 pub mod objects;
-pub mod plot;
-pub mod report;
-pub mod settings;
-pub mod trade;
+pub(super) mod plot;
+pub(super) mod report;
+pub(super) mod settings;
+pub(super) mod trade;

@@ -7,7 +7,6 @@ use crate::inverse::solver::Progress;
 use crate::session::snapshot::OpenCapture;
 use egui::{Label, RichText, ScrollArea, Ui};
 
-/// Draws the summary of the capture.
 pub fn capture(ui: &mut Ui, capture: &OpenCapture, progress: &Progress) {
     let tokens = theme::tokens(ui);
     ui.label(RichText::new(&capture.name).heading().color(tokens.strong));

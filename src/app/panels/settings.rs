@@ -8,7 +8,6 @@ use crate::inverse::settings::{Kind, PARAMETERS, Parameter, Settings, Value};
 use crate::session::snapshot::Level;
 use egui::{Checkbox, ComboBox, DragValue, Grid, Role, Ui};
 
-/// Draws the pane.
 pub fn pane(ui: &mut Ui, before: &Settings, requests: &mut Requests) {
     let mut settings = before.clone();
     let grid = Grid::new("settings").num_columns(3).striped(true);

@@ -18,7 +18,6 @@ const REACH: f32 = 14.0;
 /// Least height of a plot with a legend, in points of the screen.
 const LEGEND: f32 = 160.0;
 
-/// Draws the pane.
 pub fn pane(ui: &mut Ui, parts: &mut Parts<'_>, measured: &Measured) {
     let (document, requests) = (parts.document, &mut *parts.requests);
     let view = &mut parts.view.panels.trade;

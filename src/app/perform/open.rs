@@ -8,8 +8,7 @@ use crate::capture::import::{self, ImportOptions};
 use crate::capture::read::CAMERAS;
 use crate::error::{Error, Result};
 use crate::export;
-use crate::session::command::{Command, Source};
-use crate::session::path_kind::PathKind;
+use crate::session::command::{Command, PathKind, Source};
 use crate::session::snapshot::Level;
 use std::path::{Path, PathBuf};
 
@@ -58,7 +57,6 @@ impl App {
         self.view.shell.start.asked = true;
     }
 
-    /// Opens what was imported.
     pub(in crate::app) fn take_import(&mut self) {
         let Some((out, task)) = &mut self.jobs.importing else {
             return;

@@ -42,7 +42,6 @@ impl App {
         regrouped
     }
 
-    /// Makes one object of those that are selected.
     pub(super) fn join_objects(&mut self) {
         let objects = self.document.names(&self.view.selection.all());
         self.regroup(Regroup::Join { objects });

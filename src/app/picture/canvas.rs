@@ -13,7 +13,6 @@ use crate::app::view::Parts;
 use crate::scene::camera::Camera;
 use egui::{Color32, Id, Pos2, Rect, Response, Role, Sense, Ui, UiBuilder, vec2};
 
-/// Draws the pane of one picture.
 pub fn pane(ui: &mut Ui, parts: &mut Parts<'_>, rect: Rect, quantity: Quantity) {
     let shown = parts.view.look.held(quantity);
     parts.view.needed.note(shown);

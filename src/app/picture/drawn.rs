@@ -14,9 +14,7 @@ use std::sync::Arc;
 /// A picture to draw.
 #[derive(Debug, Clone)]
 pub struct Drawn {
-    /// What it is.
     pub quantity: Quantity,
-    /// Its numbers.
     pub picture: Arc<Picture>,
     /// Object index of each of its pixels, where known.
     pub objects: Option<Arc<Vec<u32>>>,
@@ -102,7 +100,6 @@ fn irradiance(render: &Picture, albedo: &Picture, emission: &Picture) -> Picture
 /// What the window derives from the worker's pictures, kept until those change.
 #[derive(Debug, Default)]
 pub struct Derived {
-    /// The irradiance of the shown view.
     pub irradiance: Irradiance,
     /// The chosen photograph, there before the worker has sent anything of its view.
     photograph: Option<(usize, Arc<Picture>)>,

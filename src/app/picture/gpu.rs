@@ -35,15 +35,12 @@ struct ViewUniform {
 pub struct PicturePaint {
     /// Which texture to keep it in: one for each pane and side.
     pub slot: egui::Id,
-    /// The picture.
     pub drawn: Drawn,
-    /// How it is looked at.
     pub look: Look,
     /// The pane, in points.
     pub pane: Rect,
     /// Object to outline.
     pub selected: Option<u32>,
-    /// Colours.
     pub tokens: &'static Tokens,
 }
 
@@ -92,7 +89,6 @@ struct Slot {
     bind_group: wgpu::BindGroup,
 }
 
-/// Prepares drawing pictures into a target of this format.
 pub fn install(render_state: &eframe::egui_wgpu::RenderState) {
     let device = &render_state.device;
     let shader = device.create_shader_module(wgpu::include_wgsl!("picture.wgsl"));
@@ -252,7 +248,6 @@ impl Slot {
     }
 }
 
-/// A buffer for a uniform block.
 pub fn uniform_buffer<T>(device: &wgpu::Device) -> wgpu::Buffer {
     device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(std::any::type_name::<T>()),
@@ -262,7 +257,6 @@ pub fn uniform_buffer<T>(device: &wgpu::Device) -> wgpu::Buffer {
     })
 }
 
-/// A view of a whole texture.
 pub fn view(texture: &wgpu::Texture) -> wgpu::TextureView {
     texture.create_view(&wgpu::TextureViewDescriptor::default())
 }

@@ -11,7 +11,6 @@ use egui::Ui;
 /// What it can be wiped against.
 const AGAINST: [Quantity; 3] = [Quantity::Photograph, Quantity::Naive, Quantity::Render];
 
-/// Draws the pane.
 pub fn pane(ui: &mut Ui, parts: &mut Parts<'_>) {
     let composite = Quantity::Composite;
     parts.view.needed.note(composite);

@@ -1,12 +1,12 @@
 //! Pictures of a view: which there are, how they are looked at, compared, and drawn.
 
-pub mod canvas;
+pub(super) mod canvas;
 pub mod copy;
-pub mod drawn;
-pub mod gpu;
-pub mod hero;
-pub mod inspect;
+pub(super) mod drawn;
+pub(super) mod gpu;
+pub(super) mod hero;
+pub(super) mod inspect;
 pub mod look;
 pub mod quantity;
-pub mod ramp;
-pub mod wipe;
+pub(super) mod ramp;
+pub(super) mod wipe;

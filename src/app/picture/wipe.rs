@@ -8,7 +8,6 @@ use crate::app::theme;
 use crate::app::view::Parts;
 use egui::{Align2, Color32, FontId, Id, Rect, Role, Sense, Ui, UiBuilder, WidgetInfo, pos2, vec2};
 
-/// Draws the pane.
 pub fn pane(ui: &mut Ui, parts: &mut Parts<'_>) {
     let view = &mut *parts.view;
     view.needed.note(view.compare.left);

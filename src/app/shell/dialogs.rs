@@ -6,13 +6,9 @@ use std::path::PathBuf;
 /// What a dialog asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ask {
-    /// A capture's folder.
     Capture,
-    /// A folder for results.
     SaveFolder,
-    /// A file to export to.
     ExportFile,
-    /// An object to insert.
     Object,
 }
 

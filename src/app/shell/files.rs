@@ -12,7 +12,6 @@ use egui::{DragValue, Id, Modal, Ui};
 use glam::DVec3;
 use std::path::PathBuf;
 
-/// Draws the sheet while it is open.
 pub fn show(ctx: &egui::Context, parts: &mut Parts<'_>) {
     let mut sheet = std::mem::take(&mut parts.view.shell.sheet);
     if matches!(sheet, Sheet::Closed) {

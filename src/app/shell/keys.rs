@@ -21,7 +21,6 @@ With Blender's keys: G, R, S | Move, rotate, scale; X, Y, Z hold an axis, Esc ta
 3D view: double click | Turn about this depth
 Tab: drag | Move a pane";
 
-/// Draws the window while it is open.
 pub fn show(ctx: &egui::Context, open: &mut bool) {
     Window::new("Keys and mouse")
         .open(open)

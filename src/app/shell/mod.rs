@@ -1,19 +1,19 @@
 //! Around the panes: menus, tool bar, status bar, notices, palette, start page, sheets.
 
-pub mod alignment;
-pub mod dialogs;
-pub mod files;
-pub mod keys;
-pub mod menu;
-pub mod notices;
-pub mod palette;
-pub mod sessions;
+pub(super) mod alignment;
+pub(super) mod dialogs;
+pub(super) mod files;
+pub(super) mod keys;
+pub(super) mod menu;
+pub(super) mod notices;
+pub(super) mod palette;
+pub(super) mod sessions;
 pub mod sheet;
-pub mod size;
-pub mod start;
-pub mod status;
-pub mod thumbnails;
-pub mod toolbar;
+pub(super) mod size;
+pub(super) mod start;
+pub(super) mod status;
+pub(super) mod thumbnails;
+pub(super) mod toolbar;
 
 use crate::session::snapshot::OpenCapture;
 use egui::TextureHandle;

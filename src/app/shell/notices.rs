@@ -80,7 +80,6 @@ fn toast(ui: &mut Ui, event: &Event) -> bool {
     response.clicked()
 }
 
-/// Colour of a level.
 pub fn level_color(ui: &Ui, level: Level) -> Color32 {
     let tokens = theme::tokens(ui);
     match level {

@@ -8,7 +8,6 @@ use egui::{Align, Button, Id, Key, Modal, Modifiers, Role, ScrollArea, TextEdit}
 /// What is typed, and which of the matches is marked.
 #[derive(Debug, Clone, Default)]
 pub struct Palette {
-    /// The letters typed.
     pub query: String,
     /// Index among the matches.
     pub marked: usize,
@@ -32,7 +31,6 @@ pub fn matches(query: &str) -> Vec<Action> {
     found
 }
 
-/// Draws the palette while it is open.
 pub fn show(ctx: &egui::Context, open: &mut Option<Palette>, requests: &mut Requests) {
     let Some(mut palette) = open.take() else {
         return;

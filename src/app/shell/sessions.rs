@@ -14,7 +14,6 @@ use std::time::{Duration, SystemTime};
 /// Height of a session's picture, in points.
 const HEIGHT: f32 = 40.0;
 
-/// Draws the line that names the continued session.
 pub fn line(ui: &mut Ui, parts: &mut Parts<'_>, name: &str) {
     ui.horizontal(|ui| {
         ui.label(format!(

@@ -30,13 +30,10 @@ impl Memory {
 
 /// Photographs that are being written.
 pub struct Batch {
-    /// The folder that they are written into.
     pub folder: PathBuf,
-    /// What it is at.
     pub doing: Option<WriteProgress>,
     /// How many photographs it is to write.
     pub wanted: usize,
-    /// The work.
     pub task: Task<WriteProgress, Written>,
 }
 
@@ -52,7 +49,6 @@ pub fn ending(why: Termination) -> &'static str {
     }
 }
 
-/// Draws the bar.
 pub fn bar(ui: &mut Ui, parts: &mut Parts<'_>, batch: Option<&Batch>) {
     let (document, tokens) = (parts.document, theme::tokens(ui));
     let bytes = parts.view.shell.memory.bytes();

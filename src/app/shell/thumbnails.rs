@@ -23,7 +23,6 @@ fn small(photograph: &Photograph, exposure: f32) -> ColorImage {
     ColorImage::from_rgb(size, &bytes)
 }
 
-/// Draws the strip.
 pub fn strip(ui: &mut Ui, parts: &mut Parts<'_>) {
     let Some(capture) = parts.document.capture() else {
         return;

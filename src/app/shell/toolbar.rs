@@ -8,7 +8,6 @@ use crate::app::theme;
 use crate::app::view::Parts;
 use egui::{Button, Key, Role, Slider, Ui, vec2};
 
-/// Draws the bar.
 pub fn bar(ui: &mut Ui, parts: &mut Parts<'_>) {
     let (document, requests) = (parts.document, &mut *parts.requests);
     let (shown, look) = (&parts.view.shown, &mut parts.view.look);

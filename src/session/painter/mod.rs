@@ -29,7 +29,6 @@ const MAX_REST: Duration = Duration::from_secs(4);
 /// How often a painter with nothing to do compares its pictures with the estimate.
 const IDLE_REST: Duration = Duration::from_secs(1);
 
-/// The painter's state.
 pub struct Painter {
     requests: Arc<Requests>,
     slot: Arc<Slot>,
@@ -48,10 +47,6 @@ pub struct Painter {
 }
 
 impl Painter {
-    /// A painter with as many threads as the solver.
-    ///
-    /// # Errors
-    /// The threads cannot be started.
     pub fn new(requests: Arc<Requests>, slot: Arc<Slot>, wake: Wake) -> Result<Self> {
         let threads = ThreadPoolBuilder::new()
             .num_threads(rayon::current_num_threads())

@@ -9,7 +9,6 @@ use crate::session::open_capture::OpenCapture;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// Requests to the painter.
 #[derive(Debug, Default)]
 pub struct Requests {
     wanted: Mutex<Wanted>,
@@ -19,19 +18,14 @@ pub struct Requests {
 /// Everything that decides the pictures.
 #[derive(Debug, Clone, Default)]
 pub struct Wanted {
-    /// The open capture.
     pub capture: Option<Arc<OpenCapture>>,
     /// The estimate, without the edits.
     pub found: Arc<Estimate>,
-    /// Edits of the estimate.
     pub edits: Edits,
-    /// The parameters of the solve.
     pub settings: Settings,
     /// Whether a solve is running, which gets most of the processor's time.
     pub solving: bool,
-    /// The shown frame.
     pub frame: usize,
-    /// The inserted objects.
     pub placements: Vec<Placement>,
     /// Whether objects are left without the blur and grain of their photograph.
     pub exact: bool,
@@ -41,24 +35,17 @@ pub struct Wanted {
     pub new: New,
 }
 
-/// What is new since the painter last looked.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct New {
-    /// Another capture is open.
     pub capture: bool,
     /// The worker has published another state.
     pub light: bool,
-    /// A solve has ended.
     pub ended: bool,
-    /// The edits.
     pub edits: bool,
     /// The frame, without a view.
     pub frame: bool,
-    /// The inserted objects.
     pub placements: bool,
-    /// Whether objects get blur and grain.
     pub exact: bool,
-    /// The program ends.
     pub quit: bool,
 }
 
@@ -117,7 +104,6 @@ impl Requests {
         });
     }
 
-    /// Replaces the edits.
     pub fn edit(&self, edits: &Edits) {
         self.change(|wanted| {
             wanted.new.edits |= wanted.edits != *edits;
@@ -125,7 +111,6 @@ impl Requests {
         });
     }
 
-    /// Replaces the inserted objects.
     pub fn insert(&self, placements: Vec<Placement>) {
         self.change(|wanted| {
             wanted.placements = placements;
@@ -156,7 +141,6 @@ impl Requests {
         self.change(|wanted| wanted.new.ended = true);
     }
 
-    /// Ends the painter.
     pub fn quit(&self) {
         self.change(|wanted| wanted.new.quit = true);
     }

@@ -30,15 +30,11 @@ const MAX_POWER: f32 = 100.0;
 pub struct EstimateFile {
     /// [`VERSION`] at the time of writing.
     pub version: u32,
-    /// The program's version.
     pub relit: String,
-    /// The capture it belongs to.
     pub capture: CaptureReference,
-    /// The parameters of the solve.
     pub settings: Settings,
     /// Why the solve ended; `null` during a solve.
     pub stopped_because: Option<Termination>,
-    /// Estimates of the objects, in the scene's order.
     pub objects: Named<ObjectEstimate>,
     /// File name of the maps (see [`maps::encode`]).
     pub maps: Option<String>,
@@ -68,25 +64,18 @@ pub(super) struct CheckpointFile {
 /// Reference to a capture: where it is, and its hash.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CaptureReference {
-    /// Display name.
     pub name: String,
     /// Whether it is the built-in room, which has no path.
     pub built_in: bool,
     /// Path relative to the folder of `estimate.json`, with forward slashes.
     pub relative: Option<String>,
-    /// Absolute path.
     pub absolute: Option<PathBuf>,
-    /// Hash of its content.
     pub hash: String,
-    /// Options for reading it.
     pub options: OpenOptions,
 }
 
 impl EstimateFile {
     /// The content to write into `folder`, and the bytes of the maps.
-    ///
-    /// # Errors
-    /// The maps do not fit their layout.
     pub fn new(folder: &Path, results: &Results) -> Result<(Self, Option<Vec<u8>>)> {
         let (capture, estimate) = (&results.capture, &results.estimate);
         let bytes = maps::encode(estimate)?;
@@ -159,9 +148,6 @@ impl EstimateFile {
     }
 
     /// Reads the maps of this file, which lies in `folder`.
-    ///
-    /// # Errors
-    /// They are missing or broken.
     pub fn read_maps(&self, folder: &Path) -> Result<Maps> {
         let Some(name) = &self.maps else {
             return Ok(Maps::default());
@@ -266,9 +252,6 @@ impl CaptureReference {
 }
 
 /// Reads a regular file; a pipe or device might never end.
-///
-/// # Errors
-/// It is no regular file, or cannot be read.
 pub(super) fn read_whole(path: &Path) -> Result<Vec<u8>> {
     let io = |error: std::io::Error| Error::io(path, &error);
     let metadata = fs::metadata(path).map_err(io)?;

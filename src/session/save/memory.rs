@@ -17,7 +17,6 @@ fn high_water_mark(status: &str) -> Option<u64> {
     kibibytes.checked_mul(1024)
 }
 
-/// Resident memory in bytes now.
 pub fn resident_bytes() -> Option<u64> {
     let pid = get_current_pid().ok()?;
     let mut system = System::new().ok()?;

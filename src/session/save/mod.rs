@@ -1,17 +1,16 @@
 //! Results of a solve: writing them into a folder, and loading them.
 
-pub mod estimate;
+pub(crate) mod estimate;
 pub mod maps;
-pub mod memory;
-pub mod named;
+pub(crate) mod memory;
+pub(crate) mod named;
 pub mod pictures;
-pub mod report;
+pub(crate) mod report;
 mod results;
-mod saved;
-pub mod staging;
+pub(crate) mod staging;
 mod write;
 
 pub use crate::export::overwrite::{CHECKPOINT, ESTIMATE, REPORT};
-pub use results::Results;
-pub use saved::{Saved, load, load_checkpoint};
-pub use write::{write, write_checkpoint, write_edited};
+pub use results::{Results, Saved, load, load_checkpoint};
+pub(crate) use write::write_edited;
+pub use write::{write, write_checkpoint};

@@ -12,7 +12,6 @@ use std::marker::PhantomData;
 pub struct Named<T>(pub Vec<(String, T)>);
 
 impl<T> Named<T> {
-    /// The value of a name.
     pub fn get(&self, name: &str) -> Option<&T> {
         let mut pairs = self.0.iter();
         pairs.find_map(|(known, value)| (known == name).then_some(value))

@@ -4,7 +4,6 @@ use crate::error::Result;
 use crate::export::exr::{Precision, write_rgb};
 use crate::export::falsecolor::{write_magnitude, write_signed};
 use crate::export::picture::{percentile_exposure, write_png};
-use crate::inverse::estimate::Estimate;
 use crate::math::picture::Picture;
 use crate::render::Pictures;
 use crate::scene::camera::Camera;
@@ -14,10 +13,8 @@ use crate::session::save::staging::Staging;
 use crate::session::view::difference;
 use crate::session::view::hits::Hits;
 use crate::transport::denoise::guides;
-use crate::transport::lit::LitScene;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// Folder of the pictures within the results.
 pub use crate::export::overwrite::VIEWS as FOLDER;
@@ -31,10 +28,7 @@ const PATHS: u64 = 4_000_000;
 const SAMPLES: (u64, u64) = (4, 64);
 
 /// Renders and writes the pictures of the chosen frames, `views/NNN.KIND.{exr,png}`. Only `render.png` is denoised.
-///
-/// # Errors
-/// A photograph cannot be read again, or a file cannot be written.
-pub fn write(staging: &mut Staging, results: &Results) -> Result<()> {
+pub(super) fn write(staging: &mut Staging, results: &Results) -> Result<()> {
     let capture = &results.capture;
     let chosen = results.views.chosen(capture.scene.cameras.len());
     let cameras = chosen.into_iter().map(|index| {
@@ -47,81 +41,55 @@ pub fn write(staging: &mut Staging, results: &Results) -> Result<()> {
         .map(|k| u64::from(k.width) * u64::from(k.height))
         .sum();
     let samples = (PATHS / pixels.max(1)).clamp(SAMPLES.0, SAMPLES.1) as u32;
-    let estimate = results.edited();
-    let lit = estimate.lit(&capture.scene);
-    let mut shown = Shown {
-        renders: Pictures::new(&results.renderer, &lit),
-        estimate,
-        lit: &lit,
-    };
-    for (index, camera) in &cameras {
-        frame(staging, results, &mut shown, *index, camera, samples)?;
+    let (scene, estimate) = (&capture.scene, results.edited());
+    let lit = estimate.lit(scene);
+    let mut renders = Pictures::new(&results.renderer, &lit);
+    let options = path_options(&results.settings);
+    for (index, camera) in cameras {
+        let (photograph, shown_at) = capture.sized_photograph(index, &camera)?;
+
+        // The denoiser estimates the noise from two independent renders.
+        let [a, b] = [0, 1].map(|half| {
+            let key = (results.settings.seed.wrapping_add(half), index as u64);
+            renders.film(&camera, &options, key, samples / 2).picture()
+        });
+        let halves = a.pixels.iter().zip(&b.pixels);
+        let mut render = Picture {
+            pixels: halves.map(|(a, b)| (*a + *b) * 0.5).collect(),
+            ..photograph
+        };
+        let mut clean = match results.denoiser {
+            Some(denoiser) => denoiser.denoise(&a, &b, &guides(&lit, &camera)),
+            None => render.clone(),
+        };
+        // In the photograph's values, so that the photograph can be subtracted.
+        let exposure = estimate.exposure(index);
+        let saturation = capture.frame(index)?.1.saturation;
+        for picture in [&mut render, &mut clean] {
+            exposure.apply(&camera.intrinsics, saturation, picture);
+        }
+        let error = difference(&render, &photograph);
+        let hits = Hits::new(scene, &camera);
+        let albedo = hits.albedo(scene, &lit.materials);
+        let emission = hits.emission(scene, &camera, &estimate);
+        let stderr = hits.stderr(scene, &estimate);
+        let seen = hits.seen(scene, &estimate);
+
+        let mut path =
+            |kind: &str, ending: &str| staging.file(format!("{FOLDER}/{index:03}.{kind}.{ending}"));
+        let pictures = [&render, &albedo, &emission, &error, &stderr, &seen];
+        for (kind, picture) in KINDS.into_iter().zip(pictures) {
+            write_rgb(&path(kind, "exr")?, picture, Precision::Float)?;
+        }
+        write_png(&path("render", "png")?, &clean, shown_at)?;
+        write_png(&path("albedo", "png")?, &albedo, 1.0)?;
+        let emission_at = percentile_exposure(&emission.pixels);
+        write_png(&path("emission", "png")?, &emission, emission_at)?;
+        write_signed(&path("error", "png")?, &error, "radiance")?;
+        write_magnitude(&path("stderr", "png")?, &stderr, "albedo")?;
+        write_magnitude(&path("seen", "png")?, &seen, "pixels")?;
     }
     Ok(())
-}
-
-/// What the pictures show: the estimate with the edits.
-struct Shown<'a> {
-    estimate: Arc<Estimate>,
-    lit: &'a LitScene,
-    renders: Pictures<'a>,
-}
-
-fn frame(
-    staging: &mut Staging,
-    results: &Results,
-    shown: &mut Shown<'_>,
-    index: usize,
-    camera: &Camera,
-    samples: u32,
-) -> Result<()> {
-    let capture = &results.capture;
-    let (estimate, lit) = (&shown.estimate, shown.lit);
-    let scene = &capture.scene;
-    let (photograph, shown_at) = capture.sized_photograph(index, camera)?;
-
-    // The denoiser estimates the noise from two independent renders.
-    let options = path_options(&results.settings);
-    let [a, b] = [0, 1].map(|half| {
-        let key = (results.settings.seed.wrapping_add(half), index as u64);
-        let film = shown.renders.film(camera, &options, key, samples / 2);
-        film.picture()
-    });
-    let halves = a.pixels.iter().zip(&b.pixels);
-    let mut render = Picture {
-        pixels: halves.map(|(a, b)| (*a + *b) * 0.5).collect(),
-        ..photograph
-    };
-    let mut clean = match results.denoiser {
-        Some(denoiser) => denoiser.denoise(&a, &b, &guides(lit, camera)),
-        None => render.clone(),
-    };
-    // In the photograph's values, so that the photograph can be subtracted.
-    let exposure = estimate.exposure(index);
-    let saturation = capture.frame(index)?.1.saturation;
-    for picture in [&mut render, &mut clean] {
-        exposure.apply(&camera.intrinsics, saturation, picture);
-    }
-    let error = difference(&render, &photograph);
-    let hits = Hits::new(scene, camera);
-    let albedo = hits.albedo(scene, &lit.materials);
-    let emission = hits.emission(scene, camera, estimate);
-    let stderr = hits.stderr(scene, estimate);
-    let seen = hits.seen(scene, estimate);
-
-    let mut path =
-        |kind: &str, ending: &str| staging.file(format!("{FOLDER}/{index:03}.{kind}.{ending}"));
-    let pictures = [&render, &albedo, &emission, &error, &stderr, &seen];
-    for (kind, picture) in KINDS.into_iter().zip(pictures) {
-        write_rgb(&path(kind, "exr")?, picture, Precision::Float)?;
-    }
-    write_png(&path("render", "png")?, &clean, shown_at)?;
-    write_png(&path("albedo", "png")?, &albedo, 1.0)?;
-    let emission_at = percentile_exposure(&emission.pixels);
-    write_png(&path("emission", "png")?, &emission, emission_at)?;
-    write_signed(&path("error", "png")?, &error, "radiance")?;
-    write_magnitude(&path("stderr", "png")?, &stderr, "albedo")?;
-    write_magnitude(&path("seen", "png")?, &seen, "pixels")
 }
 
 /// The pictures of an earlier run in a folder of results.

@@ -19,17 +19,11 @@ use std::f64::consts::PI;
 /// The content of `report.json`. Times in seconds, linear radiance.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
-    /// The program's version.
     pub relit: String,
-    /// Random seed.
     pub seed: u64,
-    /// Which solver ran.
     pub preset: Preset,
-    /// Number of worker threads.
     pub threads: usize,
-    /// Total time.
     pub seconds: f64,
-    /// Time of reading the capture.
     pub seconds_load: f64,
     /// Time of solving, without pauses.
     pub seconds_solve: f64,
@@ -37,13 +31,11 @@ pub struct Report {
     pub seconds_write: f64,
     /// Time from the start of the solve to the first estimate.
     pub seconds_to_first_estimate: Option<f64>,
-    /// Size of the capture.
     pub capture: Counts,
     /// Device that rendered the pictures: name of a graphics card, or `cpu`. The fit always runs on the processor.
     pub device: String,
     /// Denoiser of `render.png`: `builtin`, `oidn` or `none`.
     pub denoiser: &'static str,
-    /// Rays traced by the solver.
     pub rays: u64,
     /// `rays` over `seconds_solve`.
     pub rays_per_second: f64,
@@ -51,11 +43,8 @@ pub struct Report {
     pub peak_memory_bytes: Option<u64>,
     /// Why the solve ended; `null` during a solve.
     pub stopped_because: Option<Termination>,
-    /// Stages of the solver's pipeline.
     pub stages: Vec<Stage>,
-    /// Estimates of the objects.
     pub objects: Named<ObjectEstimate>,
-    /// Light from outside the mesh.
     pub outside_light: Option<OutsideSummary>,
     /// Each frame's linear exposure and white balance; their median is 1 in each channel.
     pub exposures: Option<Vec<Rgb>>,
@@ -65,20 +54,14 @@ pub struct Report {
     pub response: Option<[Rgb; TERMS]>,
     /// Standard error, relative, of the factor that all albedos share.
     pub albedo_common_stderr: f32,
-    /// Rejected samples, by cause.
     pub rejected_samples: BTreeMap<String, u64>,
-    /// Warnings to the user.
     pub warnings: Vec<String>,
 }
 
-/// The size of a capture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Counts {
-    /// Triangles of the mesh.
     pub triangles: usize,
-    /// Objects.
     pub objects: usize,
-    /// Photographs.
     pub frames: usize,
     /// Pixels of all photographs at the working resolution.
     pub pixels: u64,
@@ -87,13 +70,10 @@ pub struct Counts {
 /// Summary of the light from outside; the map is beside `estimate.json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OutsideSummary {
-    /// Columns of the map.
     pub width: u32,
-    /// Rows.
     pub height: u32,
     /// Mean radiance over the sphere.
     pub mean: Rgb,
-    /// Largest luminance.
     pub brightest: Option<f32>,
     /// Its distance.
     pub from: &'static str,

@@ -48,9 +48,6 @@ impl Staging {
     }
 
     /// The path to write the file to that will be `name` in the target, e.g. `views/000.render.exr`.
-    ///
-    /// # Errors
-    /// A subfolder cannot be created.
     pub fn file(&mut self, name: impl AsRef<Path>) -> Result<PathBuf> {
         let path = self.temporary.path().join(&name);
         if let Some(folder) = path.parent() {
@@ -60,10 +57,6 @@ impl Staging {
         Ok(path)
     }
 
-    /// Writes a small file.
-    ///
-    /// # Errors
-    /// It cannot be written.
     pub fn write(&mut self, name: impl AsRef<Path>, bytes: &[u8]) -> Result<()> {
         let path = self.file(&name)?;
         write_bytes(&path, bytes).map_err(|error| self.named(error))
@@ -115,7 +108,6 @@ fn locked(folder: &Path) -> Option<File> {
     Some(file)
 }
 
-/// Deletes temporary folders of killed programs.
 fn remove_abandoned(target: &Path) {
     for entry in fs::read_dir(target).into_iter().flatten().flatten() {
         let unfinished = entry.file_name().to_string_lossy().starts_with(UNFINISHED);
@@ -159,22 +151,5 @@ mod tests {
         assert_eq!(read("views/000.txt").as_deref(), Some("v"));
         assert_eq!(read("stale"), None);
         assert_eq!(fs::read_dir(folder.path()).expect("lists").count(), 2);
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn what_a_killed_program_left_aside_goes_and_what_a_living_one_fills_stays() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let abandoned = folder.path().join(format!("{UNFINISHED}killed"));
-        fs::create_dir(&abandoned).expect("makes it");
-        fs::write(abandoned.join("half"), "of it").expect("writes");
-        let mut living = start(folder.path());
-        living.write("a", b"living").expect("writes");
-        assert!(!abandoned.exists());
-        let mut other = start(folder.path());
-        other.write("a", b"other").expect("writes");
-        other.commit(|_| Vec::new()).expect("moves");
-        living.commit(|_| Vec::new()).expect("moves");
-        assert_eq!(fs::read(folder.path().join("a")).expect("reads"), b"living");
     }
 }

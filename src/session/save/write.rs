@@ -46,10 +46,7 @@ pub fn write(folder: &Path, results: &Results) -> Result<()> {
 }
 
 /// Writes an edited estimate and its pictures.
-///
-/// # Errors
-/// As [`write()`].
-pub fn write_edited(folder: &Path, results: &Results) -> Result<()> {
+pub(crate) fn write_edited(folder: &Path, results: &Results) -> Result<()> {
     let mut staging = Staging::new(folder, &results.capture_id())?;
     stage_estimate(&mut staging, folder, results)?;
     staging.commit(earlier)?;

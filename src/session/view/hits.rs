@@ -18,7 +18,6 @@ pub struct Hits {
 }
 
 impl Hits {
-    /// Casts one ray per pixel.
     pub fn new(scene: &Scene, camera: &Camera) -> Self {
         let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
         let nearest = |pixel: usize| {
@@ -72,7 +71,6 @@ impl Hits {
         picture
     }
 
-    /// Standard error of the albedo.
     pub fn stderr(&self, scene: &Scene, estimate: &Estimate) -> Picture {
         self.paint(scene, |object, hit| {
             let texel = textured(estimate, object, hit);

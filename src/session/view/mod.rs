@@ -39,7 +39,6 @@ impl Views {
         self.changed = true;
     }
 
-    /// The newest pictures.
     pub fn shown(&self) -> Option<Arc<View>> {
         self.shown.clone()
     }
@@ -48,15 +47,10 @@ impl Views {
     pub fn reset(&mut self) {
         let is_frame = |r: &ViewRequest| matches!(r.camera, ViewCamera::Frame(_));
         let request = self.request.take().filter(is_frame);
-        *self = Self {
-            changed: request.is_some(),
-            request,
-            sequence: self.sequence,
-            ..Self::default()
-        };
+        self.stop();
+        (self.changed, self.request) = (request.is_some(), request);
     }
 
-    /// Stops rendering and drops the request.
     pub fn stop(&mut self) {
         *self = Self {
             sequence: self.sequence,

@@ -23,7 +23,6 @@ const MAX_EARLIER_SAMPLES: f64 = 3.0;
 pub struct Progressive {
     width: usize,
     height: usize,
-    /// The split into layers, if any.
     pub split: Option<Arc<Split>>,
     /// Sums by rows, all layers of a pixel together.
     sums: Vec<DVec3>,
@@ -41,7 +40,6 @@ pub struct Progressive {
 }
 
 impl Progressive {
-    /// An empty render.
     pub fn new(camera: &Camera, split: Option<Arc<Split>>) -> Self {
         let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
         let layers = split.as_ref().map_or(1, |split| split.sources().len());
@@ -62,7 +60,6 @@ impl Progressive {
         }
     }
 
-    /// Layers per pixel.
     fn layers(&self) -> usize {
         self.split.as_ref().map_or(1, |split| split.sources().len())
     }
@@ -79,7 +76,6 @@ impl Progressive {
         }
     }
 
-    /// Drops all samples.
     pub fn clear(&mut self) {
         self.sums.fill(DVec3::ZERO);
         self.half.fill(DVec3::ZERO);
@@ -87,7 +83,6 @@ impl Progressive {
         self.row = 0;
     }
 
-    /// Samples per pixel.
     pub fn samples(&self) -> u32 {
         self.weight as u32
     }
@@ -102,14 +97,14 @@ impl Progressive {
         let last = (self.row + wanted).min(height);
         let (row, pass) = (self.row, u64::from(self.pass));
         let other = pass % 2 == 1 && split.is_none();
-        let mut none = vec![Vec::new(); if other { 0 } else { last - row }];
-        let halves: Vec<&mut [DVec3]> = match other {
-            true => {
-                let rows = &mut self.half[row * width..last * width];
-                rows.chunks_mut(width.max(1)).collect()
-            }
-            false => none.iter_mut().map(Vec::as_mut_slice).collect(),
-        };
+        // In every other pass the rows of `half`, else empty ones.
+        let half = &mut self.half[if other {
+            row * width..last * width
+        } else {
+            0..0
+        }];
+        let mut halves: Vec<&mut [DVec3]> = half.chunks_mut(width.max(1)).collect();
+        halves.resize_with(last - row, Default::default);
         self.sums[row * row_of..last * row_of]
             .par_chunks_mut(row_of.max(1))
             .zip(halves)

@@ -1,5 +1,6 @@
 //! A view being rendered.
 
+use crate::capture::photograph::Photograph;
 use crate::inverse::estimate::Estimate;
 use crate::math::picture::Picture;
 use crate::scene::Scene;
@@ -45,7 +46,6 @@ pub struct Target {
     watched: bool,
     /// Samples that a render must have before it replaces the shown one.
     hold: u32,
-    /// Guides of the denoiser.
     guides: Option<Vec<Option<Guide>>>,
     /// The same render by lamp, if requested.
     layers: Option<Arc<LightLayers>>,
@@ -74,13 +74,10 @@ impl Target {
             false => request.long_side,
         };
         let camera = camera.shrunk(long_side);
-        let photograph = frame.and_then(|frame| {
-            let photograph = capture.photographs.get(frame)?;
-            let whole = photograph.picture();
-            let k = &camera.intrinsics;
-            Some(Arc::new(box_filter(&whole, k.width, k.height)))
-        });
-        let saturation = frame.and_then(|frame| Some(capture.photographs.get(frame)?.saturation));
+        let taken = frame.and_then(|frame| capture.photographs.get(frame));
+        let k = &camera.intrinsics;
+        let sized = |taken: &Arc<Photograph>| box_filter(&taken.picture(), k.width, k.height);
+        let photograph = taken.map(|taken| Arc::new(sized(taken)));
         let coarse = camera.shrunk(first_long_side);
         let world = estimate.lit(&scene);
         let split = request.layers.then(|| Arc::new(Split::new(&world)));
@@ -99,7 +96,7 @@ impl Target {
             camera,
             estimate: estimate.clone(),
             photograph,
-            saturation: saturation.unwrap_or(Vec3::INFINITY),
+            saturation: taken.map_or(Vec3::INFINITY, |taken| taken.saturation),
             coarse: Some(coarse),
             hits: None,
             stale: true,
@@ -136,7 +133,6 @@ impl Target {
         }
     }
 
-    /// Whether there is nothing left to render.
     pub fn is_done(&self) -> bool {
         let sharp = !self.watched || self.render.samples() >= MAX_SAMPLES;
         self.coarse.is_none() && !self.stale && sharp

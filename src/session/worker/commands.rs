@@ -26,14 +26,14 @@ impl Worker {
         match command {
             Command::Open(source) => {
                 let options = OpenOptions {
-                    hold_out: HoldOut::from(&self.settings),
+                    hold_out: HoldOut::from(&self.state.settings),
                     check_alignment: true,
                     ..OpenOptions::default()
                 };
                 return Some(Next::Open(source, options, Begin::GoingOn));
             }
             Command::StartOver => {
-                let open = self.capture.as_ref()?;
+                let open = self.state.capture.as_ref()?;
                 // Without the changes of objects and coordinates by hand.
                 let options = OpenOptions {
                     objects: Vec::new(),
@@ -52,40 +52,43 @@ impl Worker {
             Command::Reset => {
                 self.keep(true);
                 self.store.begin_another();
-                self.continued = None;
+                self.state.continued = None;
                 (self.paused, self.step) = (false, false);
-                let open = self.capture.as_ref()?;
-                let hold_out = HoldOut::from(&self.settings);
+                let open = self.state.capture.as_ref()?;
+                let hold_out = HoldOut::from(&self.state.settings);
                 // Keep segments that were changed by hand.
                 let is_cut = open.capture.segmentation.is_some() && open.options.objects.is_empty();
                 return Some(match is_cut && open.options.hold_out != hold_out {
-                    true => Next::Recut(hold_out),
+                    true => Next::Recut(Box::new(OpenOptions {
+                        hold_out,
+                        ..open.options.clone()
+                    })),
                     false => Next::Solve(None),
                 });
             }
             Command::Reframe(mut options) => {
                 let go_on = self.solving && !self.paused;
-                let capture = self.capture.as_ref()?;
+                let capture = self.state.capture.as_ref()?;
                 // The sender may not have seen the newest objects.
                 options.objects.clone_from(&capture.options.objects);
                 return Some(Next::Reframe(options, go_on));
             }
             Command::Regroup(wanted) => {
                 let go_on = self.solving && !self.paused;
-                if let Some(open) = &self.capture
+                if let Some(open) = &self.state.capture
                     && open.hash == wanted.hash
                     && open.options.objects != wanted.changes
                 {
                     return Some(Next::Regroup(wanted, go_on));
                 }
-                self.regroupings += 1;
+                self.state.regroupings += 1;
             }
             Command::Run => return self.go_on(false),
             Command::Step => return self.go_on(true),
             Command::Pause => {
                 if self.solving {
                     self.paused = true;
-                    self.phase = Phase::Paused;
+                    self.state.phase = Phase::Paused;
                 }
             }
             // Without a running solve there is nothing to end.
@@ -93,16 +96,20 @@ impl Worker {
             Command::SolveOn => {
                 (self.paused, self.step) = (false, false);
                 let checkpoint = self.checkpoint.clone();
-                return self.capture.is_some().then_some(Next::Solve(checkpoint));
+                return self
+                    .state
+                    .capture
+                    .is_some()
+                    .then_some(Next::Solve(checkpoint));
             }
-            Command::Set(settings) => self.settings = *settings,
+            Command::Set(settings) => self.state.settings = *settings,
             // The painter has these already.
             Command::View(_) | Command::Match(_) => {}
             Command::Insert(_) => self.store.touch(),
             Command::Edit(edits) => {
-                if self.edits != edits {
+                if self.state.edits != edits {
                     self.store.touch();
-                    self.edits = edits;
+                    self.state.edits = edits;
                 }
             }
             Command::Save(folder) => self.save(&folder),
@@ -114,26 +121,26 @@ impl Worker {
 
     /// Runs on, or one iteration only.
     fn go_on(&mut self, one: bool) -> Option<Next> {
-        if !self.solving && self.capture.is_none() {
+        if !self.solving && self.state.capture.is_none() {
             return None;
         }
         (self.paused, self.step) = (one, one);
         if !self.solving {
             return Some(Next::Solve(self.checkpoint.clone()));
         }
-        self.phase = if one { Phase::Paused } else { Phase::Solving };
+        self.state.phase = if one { Phase::Paused } else { Phase::Solving };
         None
     }
 
     /// The results in their current state.
     fn results(&self) -> Option<Results> {
         Some(Results {
-            capture: self.capture.clone()?,
-            settings: self.settings.clone(),
-            estimate: self.estimate.clone(),
-            edits: self.edits.clone(),
-            progress: self.progress.clone(),
-            stopped_because: match self.phase {
+            capture: self.state.capture.clone()?,
+            settings: self.state.settings.clone(),
+            estimate: self.state.estimate.clone(),
+            edits: self.state.edits.clone(),
+            progress: self.state.progress.clone(),
+            stopped_because: match self.state.phase {
                 Phase::Finished(termination) => Some(termination),
                 _ => None,
             },
@@ -148,7 +155,7 @@ impl Worker {
 
     /// Saves the session if it is due.
     pub(super) fn keep(&mut self, now: bool) {
-        if !self.store.is_due(now) || self.estimate.objects.is_empty() {
+        if !self.store.is_due(now) || self.state.estimate.objects.is_empty() {
             return;
         }
         let Some(results) = self.results() else {
@@ -157,18 +164,18 @@ impl Worker {
         let (frame, inserted) = self.requests.shown();
         let held = SessionRecord {
             capture: results.capture.name.clone(),
-            state: match self.phase {
+            state: match self.state.phase {
                 Phase::Finished(why) => State::Finished(why),
                 Phase::Paused | Phase::Failed => State::Paused,
                 _ => State::Solving,
             },
-            precious: matches!(self.phase, Phase::Finished(_))
-                || !self.edits.is_empty()
+            precious: matches!(self.state.phase, Phase::Finished(_))
+                || !self.state.edits.is_empty()
                 || !inserted.is_empty()
                 || !results.capture.options.objects.is_empty(),
             frame,
             inserted,
-            progress: Some(self.progress.as_ref().clone()),
+            progress: Some(self.state.progress.as_ref().clone()),
         };
         if let Err(error) = self.store.write(&results, held, self.thumbnail(frame)) {
             let message = format!("the session is not kept any longer: {error}");
@@ -178,7 +185,7 @@ impl Worker {
 
     /// A small version of the shown composite, and the exposure for its display.
     fn thumbnail(&self, frame: usize) -> Option<(Picture, f32)> {
-        let capture = self.capture.as_ref()?;
+        let capture = self.state.capture.as_ref()?;
         let (_, taken) = capture.frame(frame).ok()?;
         let picture = match self.slot.pictures().insertion {
             Some(shown) if shown.frame == frame => shown.composite.as_ref().clone(),
@@ -204,7 +211,7 @@ impl Worker {
     }
 
     fn export(&mut self, request: &ExportRequest) {
-        let Some(capture) = self.capture.clone() else {
+        let Some(capture) = self.state.capture.clone() else {
             let message = "export: nothing is open; open a capture first";
             return self.say(Level::Error, message);
         };
@@ -224,7 +231,7 @@ impl Worker {
     fn save_layers(&mut self, path: &Path) {
         let view = self.slot.latest().view.clone();
         let layers = view.and_then(|view| view.layers.clone());
-        let Some((capture, layers)) = self.capture.clone().zip(layers) else {
+        let Some((capture, layers)) = self.state.capture.clone().zip(layers) else {
             let message = "layers: none are traced yet; wait for the first picture";
             return self.say(Level::Error, message);
         };

@@ -12,7 +12,6 @@ use crate::session::worker::state::{Next, Worker};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// State of a capture from an earlier run.
 pub(super) struct Earlier {
     folder: PathBuf,
     saved: Saved,
@@ -53,7 +52,7 @@ impl Worker {
             || (now.segments.is_some() && now.segments != then.segments)
             || (!now.reading.is_default() && now.reading != then.reading)
             || (now.coordinates != Coordinates::default() && now.coordinates != then.coordinates);
-        if other || (explicit_settings && saved.settings != self.settings) {
+        if other || (explicit_settings && saved.settings != self.state.settings) {
             return Ok(None);
         }
         then.check_alignment = now.check_alignment;
@@ -69,7 +68,7 @@ impl Worker {
     /// Opens a folder of results or of a session.
     pub(super) fn resume(&mut self, folder: &Path) -> Next {
         self.keep(true);
-        let before = std::mem::replace(&mut self.phase, Phase::Loading);
+        let before = std::mem::replace(&mut self.state.phase, Phase::Loading);
         self.publish(true);
         let loaded = save::load(folder).and_then(|saved| {
             let capture = (self.backend.open)(&saved.source, &saved.options)?;
@@ -91,22 +90,22 @@ impl Worker {
         self.store.resume(&capture.hash, &earlier.folder, &held);
         self.adopt(capture);
         self.requests.insert(held.inserted.clone());
-        self.inserted = Arc::new(held.inserted);
-        self.frame = held.frame;
+        self.state.inserted = Arc::new(held.inserted);
+        self.state.frame = held.frame;
         self.requests.show_frame(held.frame);
         self.set_edits(earlier.edits);
-        self.estimate = Arc::new(earlier.estimate);
-        self.settings = earlier.saved.settings;
+        self.state.estimate = Arc::new(earlier.estimate);
+        self.state.settings = earlier.saved.settings;
         self.checkpoint = earlier.saved.checkpoint;
         let reached = self.checkpoint.as_ref().map(|c| c.progress.clone());
-        self.progress = Arc::new(held.progress.or(reached).unwrap_or_default());
+        self.state.progress = Arc::new(held.progress.or(reached).unwrap_or_default());
         let name = earlier.folder.file_name().unwrap_or_default();
-        self.continued = Some(name.to_string_lossy().into_owned());
+        self.state.continued = Some(name.to_string_lossy().into_owned());
         self.touch();
         self.paused = false;
         match (earlier.held.map(|held| held.state), &self.checkpoint) {
-            (Some(State::Finished(why)), _) => self.phase = Phase::Finished(why),
-            (None, None) => self.phase = Phase::Finished(earlier.saved.termination),
+            (Some(State::Finished(why)), _) => self.state.phase = Phase::Finished(why),
+            (None, None) => self.state.phase = Phase::Finished(earlier.saved.termination),
             (state, _) => {
                 self.paused = state == Some(State::Paused);
                 return Next::Solve(self.checkpoint.clone());
@@ -117,7 +116,6 @@ impl Worker {
 }
 
 impl Earlier {
-    /// Loads the state of a capture from a folder.
     fn new(folder: &Path, saved: Saved, capture: &OpenCapture) -> Result<Self> {
         Ok(Self {
             estimate: saved.estimate_for(capture)?,

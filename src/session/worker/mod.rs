@@ -1,24 +1,55 @@
 //! The worker: a thread that owns the estimate, solves, saves and exports.
 
-mod backend;
 mod commands;
 mod earlier;
 mod state;
 mod steering;
 mod work;
 
-pub use backend::{Backend, Opener, Solver, Wake};
-
+use crate::calibrate::problem::Problem;
 use crate::error::{Error, Result};
 use crate::inverse::settings::Settings;
-use crate::session::command::{Command, Start};
+use crate::inverse::solver::{Checkpoint, Observer, Solution};
+use crate::session::command::{Command, OpenOptions, Source, Start};
 use crate::session::inbox::{self, Outbox};
+use crate::session::open_capture::OpenCapture;
 use crate::session::painter::{Painter, Requests};
 use crate::session::slot::Slot;
 use crate::session::snapshot::Snapshot;
 use state::{Begin, Next, Worker};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread::JoinHandle;
+
+/// Called by the worker after a new snapshot, at most about 30 times a second.
+pub type Wake = Arc<dyn Fn() + Send + Sync>;
+
+/// Opens a capture.
+pub type Opener = dyn Fn(&Source, &OpenOptions) -> Result<OpenCapture> + Send;
+
+/// Runs a solver until it ends.
+pub type Solver = dyn FnMut(&Problem, &Settings, Option<&Checkpoint>, &mut dyn Observer) -> Result<Solution>
+    + Send;
+
+/// Functions that the worker calls; replaced in tests.
+pub struct Backend {
+    /// Reads a capture.
+    pub open: Box<Opener>,
+    /// Runs a solver.
+    pub solve: Box<Solver>,
+    /// The folder of automatically saved sessions; `None` to save none.
+    pub sessions: Option<PathBuf>,
+}
+
+impl Default for Backend {
+    fn default() -> Self {
+        Self {
+            open: Box::new(crate::session::open::open),
+            solve: Box::new(crate::inverse::solve),
+            sessions: None,
+        }
+    }
+}
 
 /// A handle to a worker and a painter. Dropping it ends both.
 pub struct Session {

@@ -14,7 +14,6 @@ use std::time::{Duration, Instant};
 /// Time between two checkpoints that are kept in case the solver fails.
 const CHECKPOINT: Duration = Duration::from_secs(8);
 
-/// The observer of a solve.
 pub(super) struct Steering<'a> {
     worker: &'a mut Worker,
     recorded: Option<Instant>,
@@ -28,7 +27,7 @@ pub(super) struct Steering<'a> {
 
 impl<'a> Steering<'a> {
     pub fn new(worker: &'a mut Worker) -> Self {
-        let settings = worker.settings.clone();
+        let settings = worker.state.settings.clone();
         Self {
             worker,
             recorded: None,
@@ -39,7 +38,6 @@ impl<'a> Steering<'a> {
         }
     }
 
-    /// What to do after the solve.
     pub fn next(self) -> Next {
         self.next.unwrap_or(Next::Wait)
     }
@@ -53,8 +51,8 @@ impl<'a> Steering<'a> {
             return;
         }
         self.recorded = Some(Instant::now());
-        worker.progress = Arc::new(progress.clone());
-        worker.estimate = Arc::new(estimate.clone());
+        worker.state.progress = Arc::new(progress.clone());
+        worker.state.estimate = Arc::new(estimate.clone());
         worker.touch();
     }
 
@@ -73,7 +71,7 @@ impl<'a> Steering<'a> {
 
 impl Observer for Steering<'_> {
     fn known(&self) -> Known {
-        self.worker.edits.known()
+        self.worker.state.edits.known()
     }
 
     fn observe(&mut self, progress: &Progress, estimate: &Estimate) -> Control {
@@ -111,22 +109,20 @@ impl Observer for Steering<'_> {
             }
             ready = usize::MAX;
         }
-        if self.settings == self.worker.settings {
+        if self.settings == self.worker.state.settings {
             return Control::Continue;
         }
-        self.settings = self.worker.settings.clone();
+        self.settings = self.worker.state.settings.clone();
         Control::Change(Box::new(self.settings.clone()))
     }
 
     /// Takes a checkpoint from time to time, and before a command that may save it.
     fn offer(&mut self, make: &dyn Fn() -> Checkpoint) {
-        let keeps = |mail: &Mail| {
-            use Command::{Pause, Save, SolveOn};
-            matches!(mail, Mail::Command(Save(_) | Pause | SolveOn))
-        };
-        let waiting = self.worker.inbox.look_ahead();
-        self.seen = Some(waiting.len());
-        let wanted = waiting.iter().any(keeps) || self.worker.paused;
+        use Command::{Pause, Save, SolveOn};
+        let keeps = |command: &Command| matches!(command, Save(_) | Pause | SolveOn);
+        let (waiting, wanted) = self.worker.inbox.look_ahead(keeps);
+        self.seen = Some(waiting);
+        let wanted = wanted || self.worker.paused;
         if wanted || self.kept.elapsed() >= CHECKPOINT {
             self.worker.checkpoint = Some(make());
             self.worker.store.touch();

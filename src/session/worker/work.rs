@@ -1,6 +1,5 @@
 //! The worker's main loop: waiting, opening, resuming and solving, with recovery from panics.
 
-use crate::calibrate::held_out::HoldOut;
 use crate::error::{Error, panic_message};
 use crate::inverse::solver::{Checkpoint, Termination};
 use crate::session::command::{OpenOptions, Regrouping, Source};
@@ -38,17 +37,16 @@ impl Worker {
             Next::Open(source, options, begin) => self.open(&source, &options, begin),
             Next::Resume(folder) => self.resume(&folder),
             Next::Solve(checkpoint) => self.solve(checkpoint.as_ref()),
-            Next::Recut(hold_out) => self.recut(hold_out),
+            Next::Recut(options) => self.recut(&options),
             Next::Reframe(options, go_on) => self.reframe(&options, go_on),
             Next::Regroup(wanted, go_on) => self.regroup(*wanted, go_on),
             Next::Quit => Next::Quit,
         }
     }
 
-    /// Reports a panic; the last estimate is kept.
     fn contain(&mut self, payload: &(dyn Any + Send)) {
         (self.solving, self.paused, self.step) = (false, false, false);
-        self.phase = Phase::Failed;
+        self.state.phase = Phase::Failed;
         let problem = format!("internal error: {}", panic_message(payload));
         let remedy = "the last estimate is kept: save it, then reset";
         self.fail(&Error::new("worker", problem, remedy));
@@ -74,7 +72,7 @@ impl Worker {
     fn open(&mut self, source: &Source, options: &OpenOptions, begin: Begin) -> Next {
         self.keep(true);
         self.started = Instant::now();
-        let before = std::mem::replace(&mut self.phase, Phase::Loading);
+        let before = std::mem::replace(&mut self.state.phase, Phase::Loading);
         self.publish(true);
         let explicit_settings = std::mem::take(&mut self.explicit_settings);
         match (self.backend.open)(source, options) {
@@ -91,7 +89,7 @@ impl Worker {
                 self.store.begin(&capture.hash);
                 self.adopt(capture);
                 if suspect {
-                    self.phase = Phase::Paused;
+                    self.state.phase = Phase::Paused;
                     return Next::Wait;
                 }
                 Next::Solve(None)
@@ -105,13 +103,13 @@ impl Worker {
 
     /// After a failure, keeps the previous capture open and continues its solve.
     pub(super) fn recover(&mut self, before: Phase) -> Next {
-        self.phase = match before {
+        self.state.phase = match before {
             Phase::Solving | Phase::Paused if self.checkpoint.is_some() => {
                 self.paused = before == Phase::Paused;
                 return Next::Solve(self.checkpoint.clone());
             }
             Phase::Solving => Phase::Finished(Termination::Cancelled),
-            _ if self.capture.is_none() => Phase::Failed,
+            _ if self.state.capture.is_none() => Phase::Failed,
             before => before,
         };
         Next::Wait
@@ -123,31 +121,30 @@ impl Worker {
         }
         let capture = Arc::new(capture);
         self.requests.open(capture.clone());
-        self.capture = Some(capture);
-        self.inserted = Arc::default();
-        self.continued = None;
-        self.frame = 0;
+        self.state.capture = Some(capture);
+        self.state.inserted = Arc::default();
+        self.state.continued = None;
+        self.state.frame = 0;
         self.inbox.forget_changes();
         self.forget();
-        self.edits = Edits::default();
+        self.state.edits = Edits::default();
     }
 
     /// Reads the open capture with other options, keeping estimate and edits.
     fn reframe(&mut self, options: &OpenOptions, go_on: bool) -> Next {
-        let before = std::mem::replace(&mut self.phase, Phase::Loading);
+        let before = std::mem::replace(&mut self.state.phase, Phase::Loading);
         self.publish(true);
-        let kept = (self.estimate.clone(), self.progress.clone());
-        let (checkpoint, edits) = (self.checkpoint.clone(), self.edits.clone());
+        let kept = (self.state.estimate.clone(), self.state.progress.clone());
+        let (checkpoint, edits) = (self.checkpoint.clone(), self.state.edits.clone());
         if self.reopen(options) {
-            (self.estimate, self.progress) = kept;
+            (self.state.estimate, self.state.progress) = kept;
             self.checkpoint = checkpoint;
             self.set_edits(edits);
         }
-        self.phase = before;
+        self.state.phase = before;
         self.solve_if(go_on)
     }
 
-    /// Continues the solve if `go_on`.
     fn solve_if(&self, go_on: bool) -> Next {
         match go_on {
             true => Next::Solve(self.checkpoint.clone()),
@@ -155,47 +152,41 @@ impl Worker {
         }
     }
 
-    /// Reads the open capture with a new segmentation that does not use the held-out pixels, and solves from the
-    /// start; on failure, with the old segments.
-    fn recut(&mut self, hold_out: HoldOut) -> Next {
-        let Some(old) = self.capture.clone() else {
-            return Next::Wait;
-        };
-        self.phase = Phase::Loading;
+    /// Reads the open capture with a new segmentation that does not use the held-out pixels, and solves from the start; on failure,
+    /// with the old segments.
+    fn recut(&mut self, options: &OpenOptions) -> Next {
+        self.state.phase = Phase::Loading;
         self.publish(true);
-        self.reopen(&OpenOptions {
-            hold_out,
-            ..old.options.clone()
-        });
+        self.reopen(options);
         Next::Solve(None)
     }
 
     /// Reads the open capture with other objects, and solves from the start.
     fn regroup(&mut self, wanted: Regrouping, go_on: bool) -> Next {
-        let Some(old) = self.capture.clone() else {
+        let Some(old) = self.state.capture.clone() else {
             return Next::Wait;
         };
-        let before = std::mem::replace(&mut self.phase, Phase::Loading);
+        let before = std::mem::replace(&mut self.state.phase, Phase::Loading);
         self.publish(true);
         let options = OpenOptions {
             objects: wanted.changes,
             ..old.options.clone()
         };
-        self.regroupings += 1;
+        self.state.regroupings += 1;
         self.keep(true);
         if self.reopen(&options) {
             self.store.begin_another();
             self.set_edits(wanted.edits);
             return Next::Solve(None);
         }
-        self.phase = before;
+        self.state.phase = before;
         self.touch();
         self.solve_if(go_on)
     }
 
     /// Reads the open capture with other options; inserted objects stay in place. False on failure.
     fn reopen(&mut self, options: &OpenOptions) -> bool {
-        let Some(old) = self.capture.clone() else {
+        let Some(old) = self.state.capture.clone() else {
             return false;
         };
         let capture = match (self.backend.open)(&old.source, options) {
@@ -216,25 +207,24 @@ impl Worker {
             self.store.begin_another();
         }
         self.adopt(capture);
-        self.frame = frame;
+        self.state.frame = frame;
         self.requests.show_frame(frame);
         self.requests.insert(inserted.clone());
-        self.inserted = Arc::new(inserted);
+        self.state.inserted = Arc::new(inserted);
         self.store.touch();
         true
     }
 
     fn solve(&mut self, checkpoint: Option<&Checkpoint>) -> Next {
-        let Some(capture) = self.capture.clone() else {
+        let Some(capture) = self.state.capture.clone() else {
             return Next::Wait;
         };
         let problem = capture.problem();
         if checkpoint.is_none() {
             self.forget();
         }
-        let settings = self.settings.clone();
-        let paused = self.paused;
-        self.phase = match paused {
+        let settings = self.state.settings.clone();
+        self.state.phase = match self.paused {
             true => Phase::Paused,
             false => Phase::Solving,
         };
@@ -249,20 +239,20 @@ impl Worker {
             solver(&problem, &settings, checkpoint, &mut steering)
         }));
         let next = steering.next();
-        let held = self.phase.clone();
+        let held = self.state.phase.clone();
         self.backend.solve = solver;
         (self.solving, self.paused, self.step) = (false, false, false);
         self.touch();
         match outcome {
             Ok(Ok(solution)) => {
-                self.estimate = Arc::new(capture.marked_doubtful(solution.estimate));
-                self.progress = Arc::new(solution.progress);
+                self.state.estimate = Arc::new(capture.marked_doubtful(solution.estimate));
+                self.state.progress = Arc::new(solution.progress);
                 self.checkpoint = solution.checkpoint;
                 // A solve that another command ended is not finished: the session continues with it.
-                self.phase = match solution.termination {
+                self.state.phase = match solution.termination {
                     Termination::Cancelled if !matches!(next, Next::Wait) => held,
                     ended => {
-                        let (seconds, why) = (self.progress.seconds, ended.word());
+                        let (seconds, why) = (self.state.progress.seconds, ended.word());
                         let message = format!("the solve ended after {seconds:.1} s: {why}");
                         self.say(Level::Info, message);
                         Phase::Finished(ended)
@@ -273,7 +263,7 @@ impl Worker {
                 self.requests.end();
             }
             Ok(Err(error)) => {
-                self.phase = Phase::Failed;
+                self.state.phase = Phase::Failed;
                 self.fail(&error);
             }
             Err(payload) => self.contain(payload.as_ref()),

@@ -1,9 +1,9 @@
-//! The manual's chapter on the command line, generated from the commands themselves (see `tests/docs.rs`).
+//! The manual's chapter on the command line, made from the commands themselves.
 
-use crate::cli::arguments::Arguments;
-use crate::inverse::settings::PARAMETERS;
 use clap::builder::PossibleValue;
-use clap::{Arg, ArgAction, Command, CommandFactory};
+use clap::{Arg, ArgAction, Command};
+use relit::cli;
+use relit::inverse::settings::{PARAMETERS, Parameter};
 use std::collections::BTreeSet;
 
 /// Beginning of the chapter: what holds for all commands.
@@ -50,23 +50,9 @@ const EXAMPLES: &[&str] = &[
     "relit study table1 --quick --out studies",
 ];
 
-/// Checks a command line, given as its words without `relit` in front.
-///
-/// # Errors
-/// Returns clap's message if the command line is wrong.
-pub fn check(words: &[&str]) -> Result<(), String> {
-    let line = std::iter::once(&"relit").chain(words);
-    match Arguments::from_words(line) {
-        Ok(_) => Ok(()),
-        Err(error) if error.use_stderr() => Err(error.to_string()),
-        // Help and version.
-        Err(_) => Ok(()),
-    }
-}
-
 /// The chapter as Markdown: introduction, every command with its arguments and options, and the parameters of a solve.
 pub fn markdown() -> String {
-    let mut root = Arguments::command();
+    let mut root = cli::command();
     root.build();
     let mut text = INTRODUCTION.to_owned();
     text += "| command | what it does |\n| --- | --- |\n";
@@ -183,7 +169,7 @@ fn parameters(root: &Command) -> String {
         .to_owned();
     let arguments = root.get_arguments();
     for argument in arguments.filter(|a| a.get_help_heading() == Some(PARAMETERS_HEADING)) {
-        let named = |p: &&crate::inverse::settings::Parameter| p.name == argument.get_id().as_str();
+        let named = |p: &&Parameter| p.name == argument.get_id().as_str();
         let Some(parameter) = PARAMETERS.iter().find(named) else {
             continue;
         };
@@ -249,20 +235,5 @@ fn escaped(cell: &str) -> String {
     match cell.starts_with('`') {
         true => bars,
         false => bars.replace('<', "\\<"),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn examples_are_lines_that_the_program_takes() {
-        for line in EXAMPLES {
-            let words: Vec<&str> = line.split_whitespace().skip(1).collect();
-            assert_eq!(check(&words), Ok(()), "{line}");
-        }
-        assert!(check(&["solve"]).is_err());
-        assert!(check(&["solve", "room", "--nonsense"]).is_err());
     }
 }
