@@ -6,7 +6,7 @@
 use crate::capture::import::folder::Folder;
 use crate::capture::import::geometry;
 use crate::capture::import::matrix::matrix_of_rows;
-use crate::capture::import::reader::{AppliedTransform, ImportOptions, Scan};
+use crate::capture::import::{AppliedTransform, ImportOptions, Scan};
 use crate::capture::read::fields::Fields;
 use crate::capture::read::{image, lens, pose};
 use crate::capture::scan::ImportedFrame;
@@ -19,7 +19,6 @@ use std::path::PathBuf;
 
 /// Names of the file, in order of preference.
 const NAMES: [&str; 2] = ["transforms.json", "transforms_train.json"];
-/// Extensions tried for a photograph's name.
 const EXTENSIONS: [&str; 5] = ["", ".png", ".jpg", ".jpeg", ".exr"];
 /// Default metres per unit of depth.
 const DEPTH_UNIT: f64 = 0.001;
@@ -33,16 +32,7 @@ pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
     let value = folder.json(name)?;
     let place = folder.path(name).display().to_string();
     let shared = Fields::new(format!("{place}: "), &value)?;
-    let list = shared
-        .get("frames")
-        .and_then(Value::as_array)
-        .ok_or_else(|| {
-            Error::new(
-                shared.place("frames"),
-                "is not a list of frames",
-                "add the photographs",
-            )
-        })?;
+    let list = shared.frames()?;
 
     let mut scan = Scan {
         up: shared.vector("up")?,
@@ -79,8 +69,7 @@ pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
     Ok(scan)
 }
 
-/// The transform from the poses' coordinates to the mesh's: the inverse of `applied_transform` where it is undone, else the
-/// identity.
+/// The transform from the poses' coordinates to the mesh's: the inverse of `applied_transform` where it is undone, or none.
 fn to_mesh_coordinates(shared: &Fields, options: &ImportOptions, scan: &mut Scan) -> Result<DMat4> {
     let Some(applied) = shared.matrix("applied_transform")? else {
         return Ok(DMat4::IDENTITY);
