@@ -8,7 +8,7 @@ use crate::calibrate::problem::Problem;
 use crate::math::color::luminance;
 use crate::transport::environment::{Environment, direction_of, pixel_of};
 use crate::transport::surroundings::Surroundings;
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 
 /// Width of a cell of the map, in pixels of the first camera.
@@ -60,12 +60,8 @@ impl MeasuredOutside {
         });
         for pixel in past_the_mesh {
             let photograph = &problem.photographs[pixel.frame as usize];
-            let [x, y] = [
-                pixel.pixel % photograph.width,
-                pixel.pixel / photograph.width,
-            ];
-            let center = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
-            let ray = scene.cameras[pixel.frame as usize].ray(center);
+            let camera = &scene.cameras[pixel.frame as usize];
+            let ray = camera.ray(camera.corner(pixel.pixel as usize) + 0.5);
             let direction = ray.direction.normalize_or_zero();
             let map_direction = surroundings.map_direction(ray.origin, direction);
             let saturated = usize::from(photograph.is_saturated(pixel.pixel as usize));

@@ -8,13 +8,9 @@ use crate::transport::arrival::RayCount;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Greatest number of observations of an object.
 const MAX_OBSERVATIONS: usize = 600;
-/// Least number of observations of an object.
 const MIN_OBSERVATIONS: usize = 12;
-/// GGX roughnesses that are tested.
 const ROUGHNESSES: [f64; 3] = [0.1, 0.25, 0.6];
-/// Specular reflectance that is tested.
 const SPECULAR: f64 = 0.1;
 /// Expected differences are clamped to this multiple of their 68th percentile.
 const CLIP: f64 = 5.0;

@@ -18,7 +18,6 @@ const MIN_ROUGHNESS: f64 = 0.03;
 const SAFETY: f64 = 2.0;
 /// Halvings of the step of the line search between candidates.
 const HALVINGS: u32 = 5;
-/// Folds of the cross-validation over spots.
 const FOLDS: usize = 4;
 /// Fraction of the median level below which weights stop growing.
 const DARK: f64 = 0.5;
