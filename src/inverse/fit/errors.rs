@@ -250,8 +250,7 @@ pub fn score_tests(equations: &NormalEquations, free: &[usize], active: usize) -
         Coupling::Sparse(rows) => eliminate_sparse(equations, rows, &prior, active),
     };
     (eliminated.into_iter().zip(active..))
-        .map(|(own, row)| {
-            let (curvature, variance) = own;
+        .map(|((curvature, variance), row)| {
             let zero = DVec3::ZERO;
             let known = curvature.cmpgt(equations.diagonal[row] * MIN_OWN) & curvature.cmpgt(zero);
             let stderr = variance.max(zero).sqrt() / curvature;
@@ -300,9 +299,8 @@ fn eliminate_dense(
         curvatures.chain((0..tested).map(variance)).collect()
     });
     let (curvatures, variances) = values.split_at(tested);
-    (curvatures.iter().copied())
-        .zip(variances.iter().copied())
-        .collect()
+    let pairs = curvatures.iter().zip(variances);
+    pairs.map(|(c, v)| (*c, *v)).collect()
 }
 
 /// As [`eliminate_dense`] for the parameters with the most significant scores; for the others nothing is eliminated.

@@ -230,28 +230,23 @@ impl<'a> Lobes<'a> {
     ) -> Result<Option<LobeFit>, Termination> {
         let scene = &self.problem.scene;
         let spots = &self.spots[object];
+        let mut within = |bounds, drawn: &[f64], points, pass| -> Result<_, Termination> {
+            let mut gathering = self.gathering(lit, object, drawn);
+            gathering.points = self.points(object, drawn.len(), points);
+            gathering.pass = pass;
+            let (observations, cast) =
+                LitObservations::new(&gathering, scene, spots, MAX_OBSERVATIONS);
+            report(cast)?;
+            Ok(find(&observations, emits, bounds))
+        };
         let (roughness, pass, points) = match known {
             Some((lobe, refit)) => (f64::from(lobe.roughness), 3 + refit, REFIT_POINTS),
-            None => {
-                let mut gathering = self.gathering(lit, object, &FIRST_DRAWN);
-                gathering.points = self.points(object, FIRST_DRAWN.len(), FIRST_POINTS);
-                gathering.pass = 1;
-                let (observations, cast) =
-                    LitObservations::new(&gathering, scene, spots, MAX_OBSERVATIONS);
-                report(cast)?;
-                match find(&observations, emits, [0.0, 1.0]) {
-                    Some(first) => (first.roughness, 2, SECOND_POINTS),
-                    None => return Ok(None),
-                }
-            }
+            None => match within([0.0, 1.0], &FIRST_DRAWN, FIRST_POINTS, 1)? {
+                Some(first) => (first.roughness, 2, SECOND_POINTS),
+                None => return Ok(None),
+            },
         };
-        let drawn = [roughness];
-        let mut gathering = self.gathering(lit, object, &drawn);
-        gathering.points = self.points(object, drawn.len(), points);
-        gathering.pass = pass;
-        let (observations, cast) = LitObservations::new(&gathering, scene, spots, MAX_OBSERVATIONS);
-        report(cast)?;
         let near = [roughness / NEAR, roughness * NEAR];
-        Ok(find(&observations, emits, near))
+        within(near, &[roughness], points, pass)
     }
 }
