@@ -91,16 +91,15 @@ fn to_mesh_coordinates(shared: &Fields, options: &ImportOptions, scan: &mut Scan
         AppliedTransform::Keep => false,
         AppliedTransform::Guess => !same_coordinates,
     };
-    scan.remarks.push(if undo {
-        "applied_transform is undone: the mesh is taken to have the coordinates from before it; --applied-transform keep overrides".into()
+    let (remark, to_mesh) = if undo {
+        let remark = "applied_transform is undone: the mesh is taken to have the coordinates from before it; --applied-transform keep overrides";
+        (remark, rows.inverse())
     } else {
-        "applied_transform is kept: mesh and poses are taken to share its coordinates; --applied-transform undo overrides".into()
-    });
-    Ok(if undo {
-        rows.inverse()
-    } else {
-        DMat4::IDENTITY
-    })
+        let remark = "applied_transform is kept: mesh and poses are taken to share its coordinates; --applied-transform undo overrides";
+        (remark, DMat4::IDENTITY)
+    };
+    scan.remarks.push(remark.into());
+    Ok(to_mesh)
 }
 
 /// One frame; `None` if its pose is not finite.

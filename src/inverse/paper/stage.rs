@@ -209,9 +209,9 @@ impl Run<'_, '_> {
     /// Starts the next stage: an albedo for each triangle, then the worst patches cut into four. `false` if there is none.
     fn refine(&mut self) -> bool {
         let scene = &self.problem.scene;
-        let which = match self.state.descent.patches {
+        let (which, cuts) = match self.state.descent.patches {
             None if scene.triangles.len() <= scene.objects.len() => return false,
-            None => Vec::new(),
+            None => (Vec::new(), 0),
             Some(_) => {
                 let (settings, descent) = (&self.monitor.settings, &mut self.state.descent);
                 let (worst, cast) =
@@ -220,12 +220,8 @@ impl Run<'_, '_> {
                 if !worst.contains(&true) {
                     return false;
                 }
-                worst
+                (worst, self.state.cuts + 1)
             }
-        };
-        let cuts = match self.state.descent.patches {
-            None => 0,
-            Some(_) => self.state.cuts + 1,
         };
         self.state = State {
             descent: self.state.descent.refined(&self.problem.scene, &which),
