@@ -148,7 +148,7 @@ impl MeasuredOutside {
     pub fn expected(&self, direction: Vec3, band: f64) -> Vec3 {
         let elevation_of = |d: Vec3| f64::from(d.dot(self.up).clamp(-1.0, 1.0)).asin();
         let elevation = elevation_of(direction);
-        let [width, height] = self.size();
+        let [width, height] = self.map.size();
         let (mut near, mut all) = ((DVec3::ZERO, 0.0), (DVec3::ZERO, 0.0));
         for (cell, radiance) in self.cells_with(|half| &half.known) {
             let seen = direction_of(width, height, cell);
@@ -170,11 +170,6 @@ impl MeasuredOutside {
         (sum / bounds().count().max(1) as f64).as_vec3()
     }
 
-    /// Columns and rows.
-    pub fn size(&self) -> [usize; 2] {
-        self.map.size()
-    }
-
     /// The completed map of light that comes from `towards`, or of each cell's own direction: measured radiance, plus `excess`
     /// where it is a lower bound, and `elsewhere` in unmeasured directions.
     pub fn filled(
@@ -183,7 +178,7 @@ impl MeasuredOutside {
         excess: impl Fn(Vec3) -> Vec3,
         elsewhere: impl Fn(Vec3) -> Vec3,
     ) -> Vec<Vec3> {
-        let [width, height] = self.size();
+        let [width, height] = self.map.size();
         (0..width * height)
             .map(|cell| {
                 let direction = direction_of(width, height, cell);

@@ -98,7 +98,7 @@ impl Pipeline<'_, '_> {
         let emission = |surface: u32| unknowns.emission[surface as usize];
         let elsewhere = |direction| emission(grid.surface(direction));
         let [width, height] = match (sky, grid.sun) {
-            (Some(sky), _) => sky.size(),
+            (Some(sky), _) => sky.map().size(),
             (None, Some(_)) => SUN_MAP,
             (None, None) => [grid.width, grid.height],
         };
