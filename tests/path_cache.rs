@@ -128,7 +128,7 @@ fn rounds_with(
     let clusters = rows();
     (0..ROUNDS)
         .into_par_iter()
-        .map(|round| tracer(round).trace(&clusters, &[SIZE[0]]))
+        .map(|round| tracer(round).trace(&clusters))
         .collect()
 }
 
@@ -338,7 +338,7 @@ fn paths_that_end_in_photographed_radiance_hold_one_bounce_and_that_radiance() {
         weight: Vec3::ONE,
         dark: Vec3::ONE,
     }];
-    let cache = tracer.trace(&clusters, &[24; 6]);
+    let cache = tracer.trace(&clusters);
     let unknowns = Unknowns {
         albedo: vec![albedo; 6],
         emission: vec![emission; 6],

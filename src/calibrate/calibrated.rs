@@ -6,21 +6,6 @@ use crate::calibrate::gbuffer::GBuffer;
 use crate::calibrate::held_out::HoldOut;
 use crate::calibrate::problem::Problem;
 
-/// Settings of [`Calibrated::new`].
-#[derive(Debug, Clone, Copy)]
-pub struct CalibrationOptions {
-    /// Pixels kept out of every fit.
-    pub hold_out: HoldOut,
-    /// Seed of the rays inside pixels.
-    pub seed: u64,
-    /// Approximate number of pixels in the g-buffer.
-    pub pixels: usize,
-    /// Whether frames that contradict the others are left out.
-    pub leave_out: bool,
-    /// Whether exposures, vignetting and response are estimated.
-    pub exposures: bool,
-}
-
 /// The observations that a solve fits.
 pub struct Calibrated {
     /// The scene, with photographs at one exposure, outlier frames unusable, and saturated values as lower bounds.
@@ -36,20 +21,26 @@ pub struct Calibrated {
 }
 
 impl Calibrated {
-    /// Prepares the photographs of a problem.
-    pub fn new(problem: &Problem, asked: CalibrationOptions) -> Self {
-        let gbuffer_of =
-            |problem: &Problem| GBuffer::new(problem, asked.hold_out, asked.seed, asked.pixels);
+    /// Prepares the photographs of a problem with a g-buffer of about `pixels` pixels, whose rays have the seed `seed`. Frames that
+    /// contradict the others are left out if `leave_out`; exposures, vignetting and response are estimated if `expose`.
+    pub fn new(
+        problem: &Problem,
+        hold_out: HoldOut,
+        seed: u64,
+        pixels: usize,
+        leave_out: bool,
+        expose: bool,
+    ) -> Self {
+        let gbuffer_of = |problem: &Problem| GBuffer::new(problem, hold_out, seed, pixels);
         let mut problem = problem.clone();
         let mut gbuffer = gbuffer_of(&problem);
         let mut rays = gbuffer.rays;
         let mut warnings = Vec::new();
 
         // Outlier frames: they contradict the others, for example because of a wrong pose.
-        let mut observations =
-            (asked.leave_out || asked.exposures).then(|| Observations::new(&problem, &gbuffer));
+        let mut observations = (leave_out || expose).then(|| Observations::new(&problem, &gbuffer));
         let outliers = (observations.as_mut())
-            .filter(|_| asked.leave_out)
+            .filter(|_| leave_out)
             .and_then(|observations| OutlierFrames::new(observations, problem.photographs.len()))
             .filter(|outliers| !outliers.outliers.is_empty());
         if let Some(outliers) = outliers {
@@ -61,7 +52,7 @@ impl Calibrated {
 
         // Exposure, white balance, vignetting and response.
         let exposures = (observations.as_ref())
-            .filter(|_| asked.exposures)
+            .filter(|_| expose)
             .and_then(|observations| Exposures::new(&problem, observations));
         if let Some(needed) = exposures.as_ref().filter(|e| e.needed()) {
             problem = needed.corrected(&problem);

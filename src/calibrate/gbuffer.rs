@@ -151,7 +151,7 @@ impl FrameView<'_> {
     /// Where the pixel and its neighbours see one plane, the points are computed on that plane without casting rays.
     fn sample(&self, pixel: usize, mut stream: Stream) -> (GBufferPixel, Option<f32>, u64) {
         let width = self.camera.intrinsics.width as usize;
-        let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
+        let corner = self.camera.corner(pixel);
         let triangle = self.triangles[pixel];
         let center = (triangle != NOTHING)
             .then(|| self.on_plane(triangle, corner + 0.5))

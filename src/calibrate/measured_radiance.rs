@@ -20,12 +20,10 @@ const CELL_FOOTPRINTS: f32 = 1.5;
 pub struct MeasuredRadiance {
     cell: f32,
     levels: Vec<Table>,
-    /// Mean photographed radiance of each object over its pure pixels, with saturated ones at their clipped value; `None`
-    /// without such pixels.
+    /// Mean photographed radiance of each object over its pure pixels, saturated ones as clipped; `None` without such pixels.
     pub object_means: Vec<Option<Vec3>>,
 }
 
-/// The samples in one cell.
 #[derive(Debug, Clone, Copy, Default)]
 struct Cell {
     sum: DVec3,
@@ -113,8 +111,7 @@ impl MeasuredRadiance {
     }
 }
 
-/// Hash key of the cell of width `size` that a surface point lies in: from its position, object, and dominant signed axis of
-/// the normal.
+/// Hash key of the cell of width `size` that a point lies in: from its position, object, and dominant signed axis of its normal.
 #[inline]
 pub fn cell_key(size: f32, at: &SurfacePoint) -> u64 {
     let position = (at.point / size).floor();

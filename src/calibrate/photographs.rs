@@ -9,8 +9,7 @@ use crate::math::color::luminance;
 use crate::math::stats::quantile;
 use std::sync::Arc;
 
-/// An integer-encoded photograph is black if its 99th percentile of luminance is below this times the median photograph's: ten
-/// stops, more than eight bits hold.
+/// An integer-encoded photograph is black if its 99th percentile of luminance is ten stops below the median photograph's.
 const BLACK: f64 = 1.0 / 1024.0;
 /// A photograph is white if at least this fraction is saturated in every channel.
 const WHITE: f64 = 0.99;
@@ -60,8 +59,7 @@ pub fn leave_out(capture: &Capture, working: &mut Working) -> Result<()> {
     Ok(())
 }
 
-/// Masks photographs that are paired with a wrong pose, and adds a warning for each. If too few photographs would be left, only
-/// the warnings are added.
+/// Masks photographs that have a wrong pose, and adds a warning for each; warns only, if too few photographs would be left.
 pub fn leave_out_mispaired(
     capture: &Capture,
     working: &mut Working,
@@ -159,8 +157,7 @@ fn brightest(photograph: &Photograph) -> Option<f64> {
     quantile(&mut levels, 0.99)
 }
 
-/// Why a photograph shows nothing: it is masked, black or white. `None` if it shows something. `median` is the median of
-/// [`brightest`] over all photographs.
+/// Why a photograph shows nothing; `None` if it shows something. `median` is that of [`brightest`] over all photographs.
 fn blank(photograph: &Photograph, brightest: Option<f64>, median: f64) -> Option<&'static str> {
     let usable = || (0..photograph.pixels.len()).filter(|&pixel| photograph.is_usable(pixel));
     let Some(brightest) = brightest else {

@@ -79,7 +79,6 @@ pub fn segment_mesh(
     Ok(())
 }
 
-/// Sums over the pixels of a face.
 #[derive(Clone, Copy, Default)]
 struct Sum {
     radiance: DVec3,

@@ -51,7 +51,6 @@ pub struct Sharpness {
 /// The steps of log luminance between the same two points in two photographs.
 #[derive(Debug, Clone, Copy)]
 struct Step {
-    /// Frame of the other photograph.
     other: u32,
     /// Step in the photograph whose pixels the points are.
     own: f32,
@@ -75,7 +74,6 @@ struct Levels<'a> {
 }
 
 impl Step {
-    /// The larger magnitude of both steps.
     fn size(&self) -> f32 {
         self.own.abs().max(self.others.abs())
     }
@@ -95,10 +93,9 @@ impl Sharpness {
                 false => steps(problem, &levels, left_out, frame),
             })
             .collect();
-        let mut sizes: Vec<f32> = Vec::with_capacity(steps.iter().map(|s| s.sizes.len()).sum());
-        for steps in &mut steps {
-            sizes.append(&mut steps.sizes);
-        }
+        let mut sizes: Vec<f32> = (steps.iter_mut())
+            .flat_map(|steps| std::mem::take(&mut steps.sizes))
+            .collect();
         let median = upper_median(&mut sizes).unwrap_or(0.0);
         let min_step = MIN_STEP.max(ABOVE_MEDIAN * median);
         Self {
@@ -213,10 +210,7 @@ fn steps(problem: &Problem, levels: &[Levels], left_out: &[bool], frame: usize) 
     for [x, y] in pixels {
         for [u, v] in [[x + 1, y], [x, y + 1]] {
             let step = own.at([u, v]) - own.at([x, y]);
-            let hits = [
-                point(scene, frame, [x, y], width),
-                point(scene, frame, [u, v], width),
-            ];
+            let hits = [[x, y], [u, v]].map(|pixel| point(scene, frame, pixel, width));
             let [Some((object, a)), Some((neighbour, b))] = hits else {
                 continue;
             };

@@ -32,8 +32,7 @@ pub struct Photograph {
     pub encoding: Encoding,
     /// The value at which each channel saturates, in the units of `pixels`; infinite for linear files.
     pub saturation: Vec3,
-    /// The saturation value of each pixel, where pixels differ; else empty. A downsampled pixel that averages some saturated ones
-    /// has its own value as its limit.
+    /// The saturation value of each pixel, where pixels differ, as where one averages some saturated ones; else empty.
     pub limits: Vec<Vec3>,
 }
 

@@ -12,7 +12,6 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Longest truth.json that is read, in bytes.
 const MAX_BYTES: u64 = 1 << 28;
 
 /// The content of truth.json.

@@ -95,8 +95,7 @@ impl Capture {
 }
 
 impl Intrinsics {
-    /// The lens of the photograph downsampled by `factor`, in blocks from the top-left corner; a remainder at the right and the
-    /// bottom is cropped.
+    /// The lens of the photograph downsampled in blocks of `factor`² pixels from the top-left corner; a remainder is cropped.
     pub fn reduced(&self, factor: u32) -> Self {
         let scale = f64::from(factor);
         Self {
@@ -165,8 +164,7 @@ pub fn reduce(photograph: &Photograph, factor: u32) -> Photograph {
     reduced
 }
 
-/// Marks the pixels within [`CLIPPED_RADIUS`] of a saturated one as lower bounds: they hold clipped light, so part of their
-/// light is missing.
+/// Marks the pixels within [`CLIPPED_RADIUS`] of a saturated one as lower bounds: they lack part of their light.
 fn bound_near_clipped(photograph: Arc<Photograph>) -> Arc<Photograph> {
     let [width, height] = [photograph.width, photograph.height].map(|size| size as usize);
     let clipped: Vec<bool> = (0..photograph.pixels.len())

@@ -96,21 +96,16 @@ impl ObjectEstimate {
         let reflects =
             |fraction: Vec3| fraction.cmpge(Vec3::ZERO).all() && fraction.cmple(Vec3::ONE).all();
         let fraction = |value: Option<f32>| reflects(Vec3::splat(value.unwrap_or(0.0)));
+        let emits = self.emission.is_finite() && self.emission.min_element() >= 0.0;
+        let is_rough = fraction(self.roughness) && self.roughness != Some(0.0);
         let fields = [
             ("albedo", reflects(self.albedo)),
-            (
-                "emission",
-                self.emission.is_finite() && self.emission.min_element() >= 0.0,
-            ),
-            (
-                "roughness",
-                fraction(self.roughness) && self.roughness != Some(0.0),
-            ),
+            ("emission", emits),
+            ("roughness", is_rough),
             ("specular", fraction(self.specular)),
         ];
-        fields
-            .into_iter()
-            .find_map(|(name, possible)| (!possible).then_some(name))
+        let impossible = fields.into_iter().find(|(_, possible)| !possible);
+        impossible.map(|(name, _)| name)
     }
 }
 
@@ -128,8 +123,7 @@ pub struct TexelEstimate {
 }
 
 impl TexelEstimate {
-    /// The estimate with the texels of each textured object multiplied by a factor per channel; albedos are clamped to one.
-    /// `object_of` is the object of each triangle.
+    /// The texels of each textured object times a factor per channel, at most one. `object_of` is the object of each triangle.
     pub fn scaled(&self, factor: impl Fn(usize) -> Vec3, object_of: &[u32]) -> Self {
         let layout = &self.colors.layout;
         let mut scaled = self.clone();
@@ -155,8 +149,7 @@ impl TexelEstimate {
 /// Light arriving from outside the mesh.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outside {
-    /// Columns of the equirectangular map. Directions point from the scene to the light; for a box, from its centre. Row 0 is
-    /// straight up (world +y before `up` is applied).
+    /// Columns of the equirectangular map of directions towards the light, for a box from its centre. Row 0 is straight up (+y).
     pub width: u32,
     /// Rows of the map.
     pub height: u32,

@@ -1,5 +1,4 @@
-//! The reported loss: mean absolute difference between photographs and re-renders on fixed sets of pixels. Saturated values are
-//! lower bounds.
+//! The reported loss: mean absolute difference of re-renders on fixed sets of pixels. Saturated values are lower bounds.
 
 use crate::calibrate::held_out::HoldOut;
 use crate::calibrate::problem::Problem;
@@ -154,10 +153,9 @@ impl LossProbe {
             .max_by(|&a, &b| fractions[a].total_cmp(&fractions[b]))?;
         // Standard error of a ratio of means, to first order.
         let fraction = fractions[channel];
-        let mut deviations = Moments::default();
-        for ([all, late], _) in &each {
-            deviations.push(late[channel] - fraction * all[channel]);
-        }
+        let deviations: Moments = (each.iter())
+            .map(|([all, late], _)| late[channel] - fraction * all[channel])
+            .collect();
         Some(LateLight {
             fraction,
             stderr: deviations.standard_error() / all[channel],
@@ -200,20 +198,14 @@ impl LossProbe {
             ..Default::default()
         };
         let camera = &problem.scene.cameras[frame as usize];
-        let width = problem.photographs[frame as usize].width;
-        let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
+        let corner = camera.corner(pixel as usize);
         let mut sum = DVec3::ZERO;
         let mut cast = RayCount::default();
         for sample in 0..self.samples {
             let mut stream =
                 Stream::new(self.seed, u64::from(frame), u64::from(pixel), KEY + sample);
-            let [dx, dy] = stream.uniform2();
-            let path = radiance(
-                lit,
-                &camera.ray(corner + Vec2::new(dx, dy)),
-                &mut stream,
-                &options,
-            );
+            let ray = camera.ray(corner + Vec2::from_array(stream.uniform2()));
+            let path = radiance(lit, &ray, &mut stream, &options);
             sum += path.radiance.as_dvec3();
             cast.rays += u64::from(path.rays);
             cast.rejected += u64::from(path.rejected);
@@ -222,7 +214,6 @@ impl LossProbe {
     }
 }
 
-/// The mean; `None` without values.
 fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }

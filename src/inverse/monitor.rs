@@ -26,7 +26,6 @@ pub struct Monitor<'a> {
     last_report: Option<Instant>,
 }
 
-/// Interval between reports.
 const REPORT_EVERY: Duration = Duration::from_millis(30);
 
 impl<'a> Monitor<'a> {

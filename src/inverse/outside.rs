@@ -8,7 +8,7 @@ use crate::calibrate::problem::Problem;
 use crate::math::color::luminance;
 use crate::transport::environment::{Environment, direction_of, pixel_of};
 use crate::transport::surroundings::Surroundings;
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 
 /// Width of a cell of the map, in pixels of the first camera.
@@ -60,12 +60,8 @@ impl MeasuredOutside {
         });
         for pixel in past_the_mesh {
             let photograph = &problem.photographs[pixel.frame as usize];
-            let [x, y] = [
-                pixel.pixel % photograph.width,
-                pixel.pixel / photograph.width,
-            ];
-            let center = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
-            let ray = scene.cameras[pixel.frame as usize].ray(center);
+            let camera = &scene.cameras[pixel.frame as usize];
+            let ray = camera.ray(camera.corner(pixel.pixel as usize) + 0.5);
             let direction = ray.direction.normalize_or_zero();
             let map_direction = surroundings.map_direction(ray.origin, direction);
             let saturated = usize::from(photograph.is_saturated(pixel.pixel as usize));
@@ -152,7 +148,7 @@ impl MeasuredOutside {
     pub fn expected(&self, direction: Vec3, band: f64) -> Vec3 {
         let elevation_of = |d: Vec3| f64::from(d.dot(self.up).clamp(-1.0, 1.0)).asin();
         let elevation = elevation_of(direction);
-        let [width, height] = self.size();
+        let [width, height] = self.map.size();
         let (mut near, mut all) = ((DVec3::ZERO, 0.0), (DVec3::ZERO, 0.0));
         for (cell, radiance) in self.cells_with(|half| &half.known) {
             let seen = direction_of(width, height, cell);
@@ -174,11 +170,6 @@ impl MeasuredOutside {
         (sum / bounds().count().max(1) as f64).as_vec3()
     }
 
-    /// Columns and rows.
-    pub fn size(&self) -> [usize; 2] {
-        self.map.size()
-    }
-
     /// The completed map of light that comes from `towards`, or of each cell's own direction: measured radiance, plus `excess`
     /// where it is a lower bound, and `elsewhere` in unmeasured directions.
     pub fn filled(
@@ -187,7 +178,7 @@ impl MeasuredOutside {
         excess: impl Fn(Vec3) -> Vec3,
         elsewhere: impl Fn(Vec3) -> Vec3,
     ) -> Vec<Vec3> {
-        let [width, height] = self.size();
+        let [width, height] = self.map.size();
         (0..width * height)
             .map(|cell| {
                 let direction = direction_of(width, height, cell);

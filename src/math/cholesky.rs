@@ -76,7 +76,6 @@ mod tests {
     use super::*;
     use crate::math::rng::Stream;
 
-    /// A random positive definite matrix.
     fn definite(n: usize) -> DMatrix<f64> {
         let mut stream = Stream::new(n as u64, 0, 0, 0);
         let root = DMatrix::from_fn(n, n, |_, _| f64::from(stream.uniform()) - 0.5);

@@ -50,8 +50,7 @@ fn cache() -> (PathCache, Vec<Cluster>, Vec<usize>) {
         stage: 0,
         round: 0,
     };
-    let widths: Vec<u32> = problem.photographs.iter().map(|p| p.width).collect();
-    let cache = tracer.trace(&clusters, &widths);
+    let cache = tracer.trace(&clusters);
     assert_eq!(cache.cast.rejected, 0);
     let free = (0..SURFACES)
         .filter(|&k| k != LAMP)

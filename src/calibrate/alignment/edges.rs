@@ -29,7 +29,6 @@ const FOLD: usize = 1;
 const BORDER: usize = 2;
 const OUTLINE: usize = 3;
 
-/// The surface point that a pixel's centre sees.
 #[derive(Clone, Copy)]
 struct PixelHit {
     point: Vec3,

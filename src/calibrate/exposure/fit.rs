@@ -1,6 +1,6 @@
 //! Fits exposures, vignetting and response to observations by least absolute deviations.
 
-use crate::calibrate::exposure::normal::{Layout, ResponseBasis, levels};
+use crate::calibrate::exposure::normal::{Equations, levels};
 use crate::calibrate::exposure::observations::{Observation, Observations};
 use crate::capture::response::Response;
 use crate::math::stats::medians;
@@ -16,7 +16,6 @@ const NEAR: f64 = 0.03;
 /// Least number of cells that a photograph must share with others for its exposure to be fitted.
 pub(super) const MIN_CELLS: usize = 30;
 
-/// The fitted parts of the camera model.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ModelParts {
     pub exposures: bool,
@@ -90,31 +89,18 @@ impl CameraModel {
 /// The cells' levels are eliminated and all unknowns solved for at once. Alternating between both would take thousands of
 /// iterations for exposures that drift along a walk where each photograph shares cells with its neighbours only.
 pub(super) fn fit(observations: &[Observation], frames: usize, parts: ModelParts) -> CameraModel {
-    let mut counts = vec![0usize; frames];
-    for observation in observations {
-        counts[observation.frame] += 1;
-    }
-    let mut fitted: Vec<usize> = (0..frames).collect();
-    fitted.retain(|&frame| parts.exposures && counts[frame] >= MIN_CELLS);
-    let layout = Layout::new(fitted, frames, parts);
+    let equations = Equations::new(observations, frames, parts);
     let mut model = CameraModel::identity(frames);
     model.response = parts.response.then(Response::default);
     let mut weights = vec![DVec3::ONE; observations.len()];
-    let basis = ResponseBasis::new(observations, parts);
     for _ in 0..MAX_ITERATIONS {
-        let Some(step) = basis.solve(&weights, &layout) else {
+        let Some(mut next) = equations.solve(&weights) else {
             break;
         };
-        let before = model.clone();
-        for (exposure, &frame) in step.exposures.iter().zip(&layout.frames) {
-            model.exposures[frame] = *exposure;
-        }
-        model.power = step.power;
-        model.response = step.response;
-        let middle = medians(layout.frames.iter().map(|&frame| model.exposures[frame]));
-        for &frame in &layout.frames {
-            model.exposures[frame] -= middle;
-        }
+        let fitted = || equations.frames.iter();
+        let middle = medians(fitted().map(|&frame| next.exposures[frame]));
+        fitted().for_each(|&frame| next.exposures[frame] -= middle);
+        let before = std::mem::replace(&mut model, next);
         let exposures = model.exposures.iter().zip(&before.exposures);
         let changes = exposures
             .chain([(&model.power, &before.power)])
@@ -141,8 +127,7 @@ pub(super) fn fit(observations: &[Observation], frames: usize, parts: ModelParts
     model
 }
 
-/// Sets the exposures of held-out photographs to their median log difference from the fitted cells, and returns the remaining
-/// differences of each of them.
+/// Sets the exposures of held-out photographs to their median log difference from the fitted cells; returns what remains of each.
 pub(super) fn fit_held_out(
     observations: &Observations,
     model: &mut CameraModel,

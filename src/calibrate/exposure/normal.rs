@@ -1,6 +1,6 @@
 //! Normal equations of the camera model's unknowns, with the levels of the cells eliminated.
 
-use crate::calibrate::exposure::fit::{CameraModel, ModelParts};
+use crate::calibrate::exposure::fit::{CameraModel, MIN_CELLS, ModelParts};
 use crate::calibrate::exposure::observations::Observation;
 use crate::capture::response::{Response, TERMS};
 use glam::DVec3;
@@ -12,30 +12,48 @@ const RIDGE: f64 = 1e-9;
 /// Bisection steps for the largest valid fraction of a response.
 const BISECTIONS: usize = 12;
 
-/// The order of the unknowns: exposures of the fitted photographs, vignetting's power, the response's terms.
-pub(super) struct Layout {
+/// The least-squares equations of the camera model's unknowns, in the order of exposures of the fitted photographs, vignetting's
+/// power, the response's terms.
+pub(super) struct Equations<'a> {
+    observations: &'a [Observation],
     /// The photographs whose exposure is fitted, in order of their rows.
     pub frames: Vec<usize>,
     /// Row of each photograph's exposure.
     row_of: Vec<Option<usize>>,
     vignetting: bool,
-    /// `None` without a response; otherwise whether its power term is fitted.
+    /// `None` without a response; otherwise whether its power term is fitted. It is undetermined if exposures are fitted.
     response: Option<bool>,
+    /// The basis functions ([`Response::basis`]) at the value of each observation; empty without a response.
+    values: Vec<[DVec3; TERMS]>,
+    /// Slope of each basis function over the power term, by linear regression over all observations.
+    powers: [DVec3; TERMS],
 }
 
-impl Layout {
-    /// Rows for the exposures of the photographs `fitted` and for the other parts. If exposures are fitted, the power of the
-    /// response is undetermined and gets no row.
-    pub fn new(fitted: Vec<usize>, frames: usize, parts: ModelParts) -> Self {
+impl<'a> Equations<'a> {
+    /// Equations of `parts` for `frames` photographs. Exposures of photographs that share too few cells are not fitted.
+    pub fn new(observations: &'a [Observation], frames: usize, parts: ModelParts) -> Self {
+        let mut counts = vec![0usize; frames];
+        for observation in observations {
+            counts[observation.frame] += 1;
+        }
+        let mut fitted: Vec<usize> = (0..frames).collect();
+        fitted.retain(|&frame| parts.exposures && counts[frame] >= MIN_CELLS);
         let mut row_of = vec![None; frames];
         for (row, &frame) in fitted.iter().enumerate() {
             row_of[frame] = Some(row);
         }
+        let values: Vec<[DVec3; TERMS]> = match parts.response {
+            true => observations.par_iter().map(basis).collect(),
+            false => Vec::new(),
+        };
         Self {
+            observations,
             frames: fitted,
             row_of,
             vignetting: parts.vignetting,
             response: parts.response.then_some(!parts.exposures),
+            powers: powers(&values),
+            values,
         }
     }
 
@@ -46,49 +64,28 @@ impl Layout {
         };
         self.frames.len() + usize::from(self.vignetting) + terms
     }
-}
 
-/// Observations with the basis of the camera's response evaluated at their values.
-pub(super) struct ResponseBasis<'a> {
-    observations: &'a [Observation],
-    /// The basis functions ([`Response::basis`]) at the value of each observation; empty without a response.
-    values: Vec<[DVec3; TERMS]>,
-    /// Slope of each basis function over the power term, by linear regression over all observations.
-    powers: [DVec3; TERMS],
-}
-
-impl<'a> ResponseBasis<'a> {
-    /// Evaluates the basis if `parts` has a response.
-    pub fn new(observations: &'a [Observation], parts: ModelParts) -> Self {
-        let values: Vec<[DVec3; TERMS]> = match parts.response {
-            true => observations.par_iter().map(basis).collect(),
-            false => Vec::new(),
-        };
-        Self {
-            observations,
-            powers: powers(&values),
-            values,
-        }
-    }
-
-    /// The weighted least-squares unknowns of all channels; `None` if a channel's matrix is singular.
-    pub fn solve(&self, weights: &[DVec3], layout: &Layout) -> Option<CameraUnknowns> {
+    /// The weighted least-squares model, its response scaled down as far as needed to make it valid; `None` if a channel's matrix
+    /// is singular.
+    pub fn solve(&self, weights: &[DVec3]) -> Option<CameraModel> {
         let [Some(r), Some(g), Some(b)] = [0, 1, 2].map(|channel| {
-            let (matrix, right) = self.normal(weights, layout, channel);
+            let (matrix, right) = self.normal(weights, channel);
             matrix.cholesky().map(|factor| factor.solve(&right))
         }) else {
             return None;
         };
         let row = |row: usize| DVec3::new(r[row], g[row], b[row]);
-        let exposures = layout.frames.len();
-        let first = exposures + usize::from(layout.vignetting);
-        Some(CameraUnknowns {
-            exposures: (0..exposures).map(row).collect(),
-            power: match layout.vignetting {
-                true => row(exposures),
+        let power = self.frames.len();
+        let first = power + usize::from(self.vignetting);
+        Some(CameraModel {
+            exposures: (self.row_of.iter())
+                .map(|exposure| exposure.map_or(DVec3::ZERO, row))
+                .collect(),
+            power: match self.vignetting {
+                true => row(power),
                 false => DVec3::ZERO,
             },
-            response: layout.response.map(|has_power| {
+            response: self.response.map(|has_power| {
                 valid_response(match has_power {
                     true => std::array::from_fn(|term| row(first + term)),
                     false => {
@@ -102,18 +99,13 @@ impl<'a> ResponseBasis<'a> {
     }
 
     /// The non-zero entries of an observation's row of the design matrix: unknown and derivative.
-    fn columns(
-        &self,
-        layout: &Layout,
-        index: usize,
-        channel: usize,
-    ) -> impl Iterator<Item = (usize, f64)> + use<> {
+    fn columns(&self, index: usize, channel: usize) -> impl Iterator<Item = (usize, f64)> + use<> {
         let observation = &self.observations[index];
-        let power = layout.frames.len();
-        let first = power + usize::from(layout.vignetting);
-        let skipped = usize::from(layout.response == Some(false));
+        let power = self.frames.len();
+        let first = power + usize::from(self.vignetting);
+        let skipped = usize::from(self.response == Some(false));
         let powers = self.powers.map(|rgb| rgb[channel]);
-        let response = layout.response.map(|_| {
+        let response = self.response.map(|_| {
             let basis = self.values[index].map(|rgb| rgb[channel]);
             (skipped..TERMS).map(move |term| {
                 // The power term is projected out of the other terms if it is not fitted.
@@ -124,21 +116,16 @@ impl<'a> ResponseBasis<'a> {
                 (first + term - skipped, projected - basis[term])
             })
         });
-        let exposure = layout.row_of[observation.frame].map(|row| (row, 1.0));
-        let vignetting = layout.vignetting.then_some((power, observation.off_axis));
+        let exposure = self.row_of[observation.frame].map(|row| (row, 1.0));
+        let vignetting = self.vignetting.then_some((power, observation.off_axis));
         (exposure.into_iter())
             .chain(vignetting)
             .chain(response.into_iter().flatten())
     }
 
     /// The weighted normal equations of one channel, with the cells' levels eliminated by the Schur complement.
-    fn normal(
-        &self,
-        weights: &[DVec3],
-        layout: &Layout,
-        channel: usize,
-    ) -> (DMatrix<f64>, DVector<f64>) {
-        let rows = layout.rows();
+    fn normal(&self, weights: &[DVec3], channel: usize) -> (DMatrix<f64>, DVector<f64>) {
+        let rows = self.rows();
         let mut matrix = DMatrix::zeros(rows, rows);
         let mut right = DVector::zeros(rows);
         let mut with_level: Vec<(usize, f64)> = Vec::new();
@@ -150,9 +137,9 @@ impl<'a> ResponseBasis<'a> {
                 let (weight, target) = (weights[index][channel], observation.level[channel]);
                 total += weight;
                 level += weight * target;
-                for (row, derivative) in self.columns(layout, index, channel) {
+                for (row, derivative) in self.columns(index, channel) {
                     right[row] += weight * derivative * target;
-                    for (column, other) in self.columns(layout, index, channel) {
+                    for (column, other) in self.columns(index, channel) {
                         matrix[(row, column)] += weight * derivative * other;
                     }
                     match with_level.iter_mut().find(|(known, _)| *known == row) {
@@ -177,15 +164,6 @@ impl<'a> ResponseBasis<'a> {
         }
         (matrix, right)
     }
-}
-
-/// The solution of one step.
-pub(super) struct CameraUnknowns {
-    /// Log exposures of [`Layout::frames`].
-    pub exposures: Vec<DVec3>,
-    pub power: DVec3,
-    /// The camera's response, scaled down as far as needed to make it valid.
-    pub response: Option<Response>,
 }
 
 /// For each observation, the weighted mean log radiance of its cell.

@@ -17,7 +17,6 @@ const ABOVE_NOISE: f64 = 0.1;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Observation {
     pub frame: usize,
-    /// The cell's hash key.
     pub cell: u64,
     /// Logarithm of the mean value.
     pub level: DVec3,

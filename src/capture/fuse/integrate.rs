@@ -1,24 +1,97 @@
-//! Integrates depth images into the distance field.
+//! The distance field in blocks of voxels, and how depth images are integrated into it.
 
-use crate::capture::fuse::block::{Block, SIDE, block_at};
-use crate::capture::fuse::view::View;
+use crate::capture::photograph::Photograph;
+use crate::capture::scan::ImportedFrame;
+use crate::capture::scan::depth::DepthMap;
 use crate::error::{Error, Result};
-use glam::{DVec2, DVec3, IVec3};
+use glam::{DVec2, DVec3, IVec3, Vec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
 /// Truncation distance of the field in voxels.
 const TRUNCATION: f64 = 4.0;
+/// Voxels along an edge of a block.
+pub const SIDE: i32 = 8;
+const VOLUME: usize = (SIDE * SIDE * SIDE) as usize;
+
+/// The field at a voxel's centre.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Voxel {
+    /// Weighted mean signed distance to the surface in units of the truncation distance, positive in front of it.
+    pub distance: f32,
+    /// Sum of weights; 0 where nothing was measured.
+    pub weight: f32,
+    /// Weighted mean linear colour.
+    pub color: Vec3,
+    pub color_weight: f32,
+}
+
+/// A cube of voxels.
+pub struct Block {
+    /// Position in units of blocks; the lowest voxel is at `SIDE` times it.
+    pub at: IVec3,
+    /// x fastest, then y, then z.
+    pub voxels: Box<[Voxel; VOLUME]>,
+}
+
+impl Block {
+    /// Index of a voxel from its coordinates within the block, each below [`SIDE`].
+    pub fn index(inside: IVec3) -> usize {
+        (inside.x + SIDE * (inside.y + SIDE * inside.z)) as usize
+    }
+
+    /// The position of a voxel in the whole grid.
+    fn voxel(&self, index: usize) -> IVec3 {
+        let i = index as i32;
+        self.at * SIDE + IVec3::new(i % SIDE, i / SIDE % SIDE, i / (SIDE * SIDE))
+    }
+}
+
+/// The block that contains a point, for voxels of `edge` metres; `None` where coordinates are too large for the grid.
+fn block_at(point: DVec3, edge: f64) -> Option<IVec3> {
+    let at = (point / (edge * f64::from(SIDE))).floor();
+    (at.abs().max_element() < f64::from(1 << 24)).then(|| at.as_ivec3())
+}
+
+/// A depth image and its photograph, looked up by points in space.
+pub struct View<'a> {
+    frame: &'a ImportedFrame,
+    photograph: Photograph,
+    depth: DepthMap,
+}
+
+impl<'a> View<'a> {
+    /// Decodes a frame that has depth.
+    pub fn load(frame: &'a ImportedFrame) -> Result<Self> {
+        let (photograph, depth) = frame.load()?;
+        Ok(Self {
+            frame,
+            photograph,
+            depth,
+        })
+    }
+
+    /// The photograph's linear colour at a point in camera coordinates; `None` outside it and at unusable pixels.
+    fn color_at(&self, point: DVec3) -> Option<Vec3> {
+        let pixel = self.frame.lens.project(point)?.floor();
+        let (width, height) = (self.photograph.width, self.photograph.height);
+        let far = DVec2::new(f64::from(width), f64::from(height));
+        if !(pixel.cmpge(DVec2::ZERO) & pixel.cmplt(far)).all() {
+            return None;
+        }
+        let index = pixel.y as usize * width as usize + pixel.x as usize;
+        let usable = self.photograph.is_usable(index);
+        usable.then(|| self.photograph.pixels[index])
+    }
+}
 
 /// A sparse truncated signed distance field. Voxel (i, j, k) sits at (i, j, k) times the edge.
 pub struct Field {
     /// Edge of a voxel in metres.
     pub edge: f64,
-    /// All blocks, in the order of allocation.
     pub blocks: Vec<Block>,
     /// Index into `blocks` by block position.
     pub places: HashMap<IVec3, usize>,
-    /// Limit on the memory of the blocks.
     max_bytes: usize,
 }
 
@@ -32,15 +105,13 @@ impl Field {
         }
     }
 
-    /// Integrates one view.
-    ///
-    /// # Errors
-    /// The blocks exceed the memory limit.
+    /// Integrates one view. It is an error if the blocks exceed the memory limit.
     pub fn integrate(&mut self, view: &View) -> Result<()> {
         // Allocate the blocks near the measured surface.
         let mut new = blocks_near_surface(view, self.edge);
         new.retain(|at| !self.places.contains_key(at));
-        if (self.blocks.len() + new.len()).saturating_mul(Block::bytes()) > self.max_bytes {
+        let block_bytes = size_of::<Block>() + VOLUME * size_of::<Voxel>();
+        if (self.blocks.len() + new.len()).saturating_mul(block_bytes) > self.max_bytes {
             return Err(Error::new(
                 "--voxel",
                 format!(
@@ -53,7 +124,10 @@ impl Field {
         }
         for at in new {
             self.places.insert(at, self.blocks.len());
-            self.blocks.push(Block::new(at));
+            self.blocks.push(Block {
+                at,
+                voxels: Box::new([Voxel::default(); VOLUME]),
+            });
         }
         // Update every visible block, so that observed free space is cleared.
         let edge = self.edge;
@@ -87,7 +161,7 @@ fn blocks_near_surface(view: &View, edge: f64) -> Vec<IVec3> {
                 let Some(ray) = view.depth.lens.ray(pixel) else {
                     continue;
                 };
-                let point = view.pose.to_world(ray.extend(1.0) * depth);
+                let point = view.frame.pose.to_world(ray.extend(1.0) * depth);
                 // The corners of a cube around the point reach every block that it touches, as 2 · reach ≤ the side of a block.
                 for corner in 0..8 {
                     let sign = |bit: i32| f64::from((corner >> bit & 1) * 2 - 1);
@@ -112,7 +186,10 @@ fn update(block: &mut Block, view: &View, edge: f64) {
     }
     let reach = TRUNCATION * edge;
     for index in 0..block.voxels.len() {
-        let point = view.pose.to_camera(block.voxel(index).as_dvec3() * edge);
+        let point = view
+            .frame
+            .pose
+            .to_camera(block.voxel(index).as_dvec3() * edge);
         let Some(pixel) = view.depth.lens.project(point) else {
             continue;
         };
@@ -144,7 +221,7 @@ fn may_be_seen(block: &Block, view: &View, edge: f64) -> bool {
     let half = f64::from(SIDE) * 0.5;
     let radius = half * edge * 3f64.sqrt();
     let middle = (block.at * SIDE).as_dvec3() + DVec3::splat(half);
-    let p = view.pose.to_camera(middle * edge);
+    let p = view.frame.pose.to_camera(middle * edge);
     if p.z < -radius {
         return false;
     }

@@ -4,10 +4,8 @@
 //! A voxel stores the weighted mean of (measured depth − its own depth), truncated at a few voxels, and the mean linear colour
 //! of the photographs near the surface. Only blocks near a measured surface are allocated, by default at most [`MAX_BYTES`].
 
-mod block;
 mod integrate;
 mod surface;
-mod view;
 mod voxel;
 
 pub use voxel::voxel_size;
@@ -15,9 +13,8 @@ pub use voxel::voxel_size;
 use crate::capture::mesh::Mesh;
 use crate::capture::scan::ImportedFrame;
 use crate::error::{Error, Result};
-use integrate::Field;
+use integrate::{Field, View};
 use rayon::prelude::*;
-use view::View;
 
 /// Default limit on the memory of all voxels.
 pub const MAX_BYTES: usize = 2 << 30;

@@ -1,7 +1,6 @@
 //! Extracts the zero surface of the distance field block by block, with the crate fast-surface-nets.
 
-use crate::capture::fuse::block::{Block, SIDE, Voxel};
-use crate::capture::fuse::integrate::Field;
+use crate::capture::fuse::integrate::{Block, Field, SIDE, Voxel};
 use crate::capture::mesh::Mesh;
 use fast_surface_nets::ndshape::{ConstShape, ConstShape3u32};
 use fast_surface_nets::{SurfaceNetsBuffer, surface_nets};
@@ -14,7 +13,6 @@ type Samples = ConstShape3u32<10, 10, 10>;
 /// Blocks extracted in parallel before their surfaces are merged.
 const BATCH: usize = 1024;
 
-/// The surface of one block.
 #[derive(Default)]
 struct Piece {
     /// The grid cell of each vertex, which has no other vertex; its position and its colour.
@@ -102,8 +100,8 @@ fn piece(field: &Field, block: &Block) -> Piece {
         let cell = low + IVec3::from_array(cell.map(|c| c as i32));
         (piece.vertices).push((cell, position, mean_color(&corners)));
     }
-    for triangle in net.indices.chunks_exact(3) {
-        let corners = [triangle[0], triangle[1], triangle[2]].map(|i| kept[i as usize]);
+    for triangle in net.indices.as_chunks::<3>().0 {
+        let corners = triangle.map(|i| kept[i as usize]);
         if let [Some(a), Some(b), Some(c)] = corners {
             piece.triangles.push([a, b, c]);
         }

@@ -5,9 +5,7 @@ use crate::error::{Error, Result};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// Longest text file that is read, in bytes.
 const MAX_TEXT: u64 = 1 << 28;
-/// Maximum number of entries of a folder.
 const MAX_ENTRIES: usize = 1 << 20;
 
 /// A folder that paths may not leave.
@@ -89,9 +87,6 @@ impl Folder {
     }
 
     /// Names of the entries of a subfolder (`""` for the folder itself), in natural order (`9` before `10`).
-    ///
-    /// # Errors
-    /// The subfolder leads out of the folder, cannot be read or has too many entries.
     pub fn names(&self, inside: &str) -> Result<Vec<String>> {
         let path = self.path(inside);
         let whole = self.confine.folder().canonicalize();

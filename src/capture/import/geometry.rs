@@ -10,8 +10,7 @@ use crate::capture::scan::ImportedFrame;
 use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
 
-/// Reads a mesh; returns it and whether the file defines objects. `mirrored` converts a left-handed world: it negates z and
-/// reverses the winding.
+/// Reads a mesh; returns it and whether the file defines objects. `mirrored` negates z and reverses the winding.
 pub fn read(
     path: &Path,
     folder: &Folder,
@@ -97,9 +96,6 @@ pub fn find(
 }
 
 /// Fuses a mesh from all depth images.
-///
-/// # Errors
-/// No frame has depth, a depth image is broken, or the voxels need too much memory.
 pub fn fuse(
     source: &Path,
     frames: &[ImportedFrame],

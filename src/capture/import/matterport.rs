@@ -6,10 +6,10 @@
 //! cameras come from `undistorted_camera_parameters/*.conf` with `undistorted_color_images`, whose cy counts from the bottom. Depth
 //! is in quarter millimetres. The mesh in `house_segmentations`, which has objects, is preferred.
 
+use crate::capture::import::Scan;
 use crate::capture::import::folder::Folder;
 use crate::capture::import::geometry;
 use crate::capture::import::matrix::{number, numbers, pose_of_rows, rows};
-use crate::capture::import::reader::Scan;
 use crate::capture::scan::ImportedFrame;
 use crate::capture::scan::depth::{self, DepthImage};
 use crate::capture::scan::lens::{Lens, Model};

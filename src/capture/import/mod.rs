@@ -7,30 +7,138 @@
 
 mod colmap;
 mod folder;
-mod format;
 mod geometry;
 mod matrix;
 mod matterport;
 mod nerf;
-mod reader;
 mod rgbd;
 
 pub use crate::capture::scan::{DepthImage, ImportedFrame, Lens, Model};
-pub use format::Format;
-pub use reader::{AppliedTransform, ImportOptions};
 
 use crate::capture::mesh::Mesh;
 use crate::capture::poses;
 use crate::error::{Error, Result};
 use folder::Folder;
 use glam::DVec3;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Photographs selected from a video by default.
 const PHOTOGRAPHS_OF_A_VIDEO: usize = 200;
 
 /// Metres per depth unit at and above which a depth image is refused.
 const MAX_UNIT: f64 = 1000.0;
+
+/// A layout of a scan's files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// 7-Scenes and 3DMatch: `frame-N.color.png`, `.depth.png`, `.pose.txt`, possibly in `seq-NN`.
+    SevenScenes,
+    /// ScanNet as its exporter writes it: `color`, `depth`, `pose`, `intrinsic`.
+    ScanNet,
+    /// TUM RGB-D: `rgb.txt`, `depth.txt`, `groundtruth.txt`.
+    Tum,
+    /// ICL-NUIM: as TUM, with a left-handed camera.
+    IclNuim,
+    /// Open3D's reconstruction system and Redwood: colour and depth folders, a trajectory, camera_intrinsic.json.
+    Open3d,
+    /// A COLMAP model, text or binary, with its photographs and a mesh.
+    Colmap,
+    /// transforms.json of Nerfstudio, instant-ngp, Polycam, Record3D.
+    Nerfstudio,
+    /// A house of Matterport3D.
+    Matterport,
+}
+
+impl Format {
+    /// All layouts, with their names for `--format`.
+    pub const ALL: &[(&str, Self)] = &[
+        ("7scenes", Self::SevenScenes),
+        ("scannet", Self::ScanNet),
+        ("tum", Self::Tum),
+        ("icl-nuim", Self::IclNuim),
+        ("open3d", Self::Open3d),
+        ("colmap", Self::Colmap),
+        ("nerfstudio", Self::Nerfstudio),
+        ("matterport", Self::Matterport),
+    ];
+
+    /// A description for messages.
+    pub fn description(self) -> &'static str {
+        match self {
+            Self::SevenScenes => "7-Scenes (frame-N.color, .depth, .pose)",
+            Self::ScanNet => "a ScanNet export (color, depth, pose, intrinsic)",
+            Self::Tum => "TUM RGB-D (rgb.txt, depth.txt, groundtruth.txt)",
+            Self::IclNuim => "ICL-NUIM (TUM's layout, left-handed camera)",
+            Self::Open3d => "Open3D's reconstruction system (colour, depth, trajectory)",
+            Self::Colmap => "a COLMAP model (cameras, images)",
+            Self::Nerfstudio => "Nerfstudio (transforms.json)",
+            Self::Matterport => "a house of Matterport3D",
+        }
+    }
+}
+
+/// What a person may choose about an import.
+#[derive(Debug, Clone, Default)]
+pub struct ImportOptions {
+    /// The layout of the folder; detected from its content if `None`.
+    pub format: Option<Format>,
+    /// The mesh file, anywhere on disk; `None` takes the scan's own mesh or fuses one from depth.
+    pub mesh: Option<PathBuf>,
+    /// Voxel edge of a fused mesh in metres.
+    pub voxel: Option<f64>,
+    /// Every how many-th frame becomes a photograph; 0 and 1 keep all.
+    pub every: usize,
+    /// At most so many photographs, evenly spaced.
+    pub max_frames: Option<usize>,
+    /// Whether the scan's poses stay as they are, instead of being refined on photographs and depth images.
+    pub keep_poses: bool,
+    /// Up direction, written into the capture.
+    pub up: Option<DVec3>,
+    /// fx, fy, cx, cy of the colour camera in pixels, pixel centres at whole numbers, for scans without intrinsics.
+    pub intrinsics: Option<[f64; 4]>,
+    /// How Nerfstudio's `applied_transform` is treated.
+    pub applied_transform: AppliedTransform,
+}
+
+/// How Nerfstudio's `applied_transform`, a transform of the poses after reconstruction, is treated.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum AppliedTransform {
+    /// Undone for a mesh from elsewhere, kept for a mesh that the file names or that is fused.
+    #[default]
+    Guess,
+    /// Undone: the mesh has the coordinates from before the transform.
+    Undo,
+    /// Kept: mesh and poses share the transformed coordinates.
+    Keep,
+}
+
+/// What a format's reader finds.
+#[derive(Debug, Default)]
+struct Scan {
+    /// All frames with a pose, in order.
+    frames: Vec<ImportedFrame>,
+    mesh: Option<PathBuf>,
+    /// Up direction, where the scan gives one.
+    up: Option<DVec3>,
+    /// Whether the scan's world is left-handed: the frames are already mirrored in z, the mesh is not.
+    mirrored: bool,
+    /// Whether the frames are a video, so that neighbours are nearly equal.
+    is_video: bool,
+    remarks: Vec<String>,
+}
+
+impl Scan {
+    /// Adds a remark about the photographs whose lens a capture does not support.
+    fn remark_on_resampled(&mut self) {
+        let resampled = self.frames.iter().filter(|f| !f.lens.fits_a_capture());
+        let count = resampled.count();
+        if count > 0 {
+            self.remarks.push(format!(
+                "{count} photographs are resampled to a pinhole of the same focal length; what lies outside it is lost"
+            ));
+        }
+    }
+}
 
 /// What is needed to write a capture.
 #[derive(Debug, Clone)]

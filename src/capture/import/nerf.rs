@@ -6,7 +6,7 @@
 use crate::capture::import::folder::Folder;
 use crate::capture::import::geometry;
 use crate::capture::import::matrix::matrix_of_rows;
-use crate::capture::import::reader::{AppliedTransform, ImportOptions, Scan};
+use crate::capture::import::{AppliedTransform, ImportOptions, Scan};
 use crate::capture::read::fields::Fields;
 use crate::capture::read::{image, lens, pose};
 use crate::capture::scan::ImportedFrame;
@@ -19,7 +19,6 @@ use std::path::PathBuf;
 
 /// Names of the file, in order of preference.
 const NAMES: [&str; 2] = ["transforms.json", "transforms_train.json"];
-/// Extensions tried for a photograph's name.
 const EXTENSIONS: [&str; 5] = ["", ".png", ".jpg", ".jpeg", ".exr"];
 /// Default metres per unit of depth.
 const DEPTH_UNIT: f64 = 0.001;
@@ -33,16 +32,7 @@ pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
     let value = folder.json(name)?;
     let place = folder.path(name).display().to_string();
     let shared = Fields::new(format!("{place}: "), &value)?;
-    let list = shared
-        .get("frames")
-        .and_then(Value::as_array)
-        .ok_or_else(|| {
-            Error::new(
-                shared.place("frames"),
-                "is not a list of frames",
-                "add the photographs",
-            )
-        })?;
+    let list = shared.frames()?;
 
     let mut scan = Scan {
         up: shared.vector("up")?,
@@ -79,8 +69,7 @@ pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
     Ok(scan)
 }
 
-/// The transform from the poses' coordinates to the mesh's: the inverse of `applied_transform` where it is undone, else the
-/// identity.
+/// The transform from the poses' coordinates to the mesh's: the inverse of `applied_transform` where it is undone, or none.
 fn to_mesh_coordinates(shared: &Fields, options: &ImportOptions, scan: &mut Scan) -> Result<DMat4> {
     let Some(applied) = shared.matrix("applied_transform")? else {
         return Ok(DMat4::IDENTITY);
@@ -102,16 +91,15 @@ fn to_mesh_coordinates(shared: &Fields, options: &ImportOptions, scan: &mut Scan
         AppliedTransform::Keep => false,
         AppliedTransform::Guess => !same_coordinates,
     };
-    scan.remarks.push(if undo {
-        "applied_transform is undone: the mesh is taken to have the coordinates from before it; --applied-transform keep overrides".into()
+    let (remark, to_mesh) = if undo {
+        let remark = "applied_transform is undone: the mesh is taken to have the coordinates from before it; --applied-transform keep overrides";
+        (remark, rows.inverse())
     } else {
-        "applied_transform is kept: mesh and poses are taken to share its coordinates; --applied-transform undo overrides".into()
-    });
-    Ok(if undo {
-        rows.inverse()
-    } else {
-        DMat4::IDENTITY
-    })
+        let remark = "applied_transform is kept: mesh and poses are taken to share its coordinates; --applied-transform undo overrides";
+        (remark, DMat4::IDENTITY)
+    };
+    scan.remarks.push(remark.into());
+    Ok(to_mesh)
 }
 
 /// One frame; `None` if its pose is not finite.

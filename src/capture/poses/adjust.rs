@@ -9,7 +9,6 @@ use glam::{DMat2, DMat3, DQuat, DVec2, DVec3};
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use std::collections::BTreeMap;
 
-/// Gauss-Newton steps.
 const STEPS: usize = 10;
 /// Standard deviation of a depth image's distance, as a part of it: twice the noise of a structured-light camera at 3 m (Nguyen,
 /// Izadi and Lovell 2012), since errors of neighbouring pixels are alike.
@@ -89,8 +88,7 @@ impl<'a> Adjustment<'a> {
         Some([angle * quantile(&mut depths, 0.5)?, angle])
     }
 
-    /// Median distance in pixels between expected and seen positions, with the depths that fit best; `None` with fewer than
-    /// `least` matches.
+    /// Median distance in pixels between expected and seen positions, with the best depths; `None` with fewer than `least` matches.
     pub fn median_error(&self, poses: &[Pose], least: usize) -> Option<f64> {
         let mut depths = vec![0.0; self.tracks.len()];
         for _ in 0..STEPS {

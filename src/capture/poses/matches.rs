@@ -31,32 +31,22 @@ const MIN_DEVIATION: f64 = 0.05;
 const FAR: f64 = 12.0;
 const NEAR: f64 = 4.0;
 
-/// How far from where it is expected a point is looked for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Reach {
-    /// [`FAR`]: poses as the scan gives them.
-    Far,
-    /// [`NEAR`]: poses refined before.
-    Near,
-}
-
 /// Where a photograph shows a point of another.
 #[derive(Debug, Clone, Copy)]
 pub struct Match {
-    /// The photograph.
     pub frame: usize,
-    /// Pixel position in it.
     pub pixel: DVec2,
     /// Inverse covariance of the position in 1/px².
     pub information: DMat2,
 }
 
-/// The matches of every point, in the order of points.
+/// The matches of every point, in the order of points. Points are looked for with coarse details first if they may be `far` from
+/// where they are expected, as by poses that the scan gives.
 pub fn look_up(
     points: &[Point],
     pictures: &[Picture],
     poses: &[Pose],
-    reach: Reach,
+    far: bool,
 ) -> Vec<Vec<Match>> {
     // Points come in the order of their photographs.
     let partners: Vec<Vec<usize>> = (0..pictures.len())
@@ -69,7 +59,7 @@ pub fn look_up(
     (points.par_iter())
         .map(|point| {
             (partners[point.frame].iter())
-                .filter_map(|&frame| look_up_one(point, frame, pictures, poses, reach))
+                .filter_map(|&frame| look_up_one(point, frame, pictures, poses, far))
                 .collect()
         })
         .collect()
@@ -112,7 +102,7 @@ fn look_up_one(
     other: usize,
     pictures: &[Picture],
     poses: &[Pose],
-    reach: Reach,
+    far: bool,
 ) -> Option<Match> {
     // The warp from the point's photograph to the other, linear around the point.
     let from = &pictures[point.frame];
@@ -136,13 +126,11 @@ fn look_up_one(
     }
 
     let to = &pictures[other];
-    let guess = match reach {
-        Reach::Far => {
-            let patch = Patch::new(&from.coarse, point.pixel, 2, warp)?;
-            patch.find(&to.coarse, start, FAR)?.pixel
-        }
-        Reach::Near => start,
-    };
+    let mut guess = start;
+    if far {
+        let patch = Patch::new(&from.coarse, point.pixel, 2, warp)?;
+        guess = patch.find(&to.coarse, start, FAR)?.pixel;
+    }
     let patch = Patch::new(&from.fine, point.pixel, 1, warp)?;
     let found = patch.find(&to.fine, guess, NEAR)?;
     let far = DVec2::new(to.fine.width as f64, to.fine.height as f64) - RADIUS as f64;
@@ -277,32 +265,4 @@ fn outer(v: DVec2) -> DMat2 {
 
 fn trace(m: DMat2) -> f64 {
     m.x_axis.x + m.y_axis.y
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_shifted_patch_is_found_whatever_the_exposure() {
-        // Waves that are smooth at the size of a pixel.
-        let wave = |x: f64, y: f64| {
-            (0.7 * x + 0.2 * y).sin() + (0.9 * y - 0.3 * x).cos() + 0.5 * (0.5 * x * 0.8 - y).sin()
-        };
-        let picture = |shift: DVec2, gain: f64, offset: f64| {
-            Grey::from_fn([48, 40], |x, y| {
-                (gain * wave(x as f64 - shift.x, y as f64 - shift.y) + offset) as f32
-            })
-        };
-        let shift = DVec2::new(1.37, -0.81);
-        let [from, to] = [picture(DVec2::ZERO, 1.0, 0.0), picture(shift, 0.6, 2.0)];
-        let patch = Patch::new(&from, [22, 19], 1, DMat2::IDENTITY).expect("structure");
-        let start = DVec2::new(22.5, 19.5);
-        let found = patch.find(&to, start, 4.0).expect("found");
-        // Bilinear interpolation of these waves shifts them by some hundredths of a pixel.
-        let off = found.pixel.distance(start + shift);
-        assert!(off < 0.05, "{off}");
-        assert!(found.correlation > 0.98);
-        assert!(patch.find(&to, start, 0.5).is_none());
-    }
 }

@@ -14,7 +14,7 @@ use crate::capture::camera::Pose;
 use crate::capture::scan::{ImportedFrame, Lens};
 use crate::error::Result;
 use adjust::{Adjustment, turn_between};
-use matches::{Match, Reach};
+use matches::Match;
 use picture::Picture;
 use points::Point;
 use rayon::prelude::*;
@@ -56,8 +56,7 @@ pub fn refine(frames: &mut [ImportedFrame], chosen: &[usize]) -> Result<Option<S
     let mut poses = given.clone();
     let mut seen: Vec<Vec<Match>> = Vec::new();
     for round in 0..ROUNDS {
-        let reach = if round == 0 { Reach::Far } else { Reach::Near };
-        seen = matches::look_up(&points, &pictures, &poses, reach);
+        seen = matches::look_up(&points, &pictures, &poses, round == 0);
         let fitted = Adjustment::new(&points, &seen, &lenses, |point| point % HELD_OUT != 0);
         poses = fitted.adjust(&given, poses);
     }

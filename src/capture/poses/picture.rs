@@ -91,8 +91,7 @@ impl Picture {
         })
     }
 
-    /// The pixel position of a point in camera coordinates; `None` where a patch of `margin` pixels around it leaves the
-    /// picture.
+    /// The pixel position of a point in camera coordinates; `None` where a patch of `margin` pixels around it leaves the picture.
     pub fn project(&self, point: DVec3, margin: f64) -> Option<DVec2> {
         let pixel = self.lens.project(point)?;
         let far = DVec2::new(self.fine.width as f64, self.fine.height as f64) - margin;
@@ -142,18 +141,5 @@ impl Grey {
             0.5 * (self.pixel(x + 1, y) - self.pixel(x - 1, y)),
             0.5 * (self.pixel(x, y + 1) - self.pixel(x, y - 1)),
         ]
-    }
-}
-
-#[cfg(test)]
-impl Grey {
-    pub fn from_fn([width, height]: [usize; 2], value: impl Fn(usize, usize) -> f32) -> Self {
-        Self {
-            width,
-            height,
-            values: (0..width * height)
-                .map(|i| value(i % width, i / width))
-                .collect(),
-        }
     }
 }

@@ -24,7 +24,6 @@ const STRIDE: usize = 4;
 /// A point on a surface, seen at a pixel of the photograph that it was found in.
 #[derive(Debug, Clone, Copy)]
 pub struct Point {
-    /// Index of the photograph.
     pub frame: usize,
     /// Column and row.
     pub pixel: [usize; 2],

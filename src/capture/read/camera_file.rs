@@ -12,7 +12,6 @@ use std::path::Path;
 
 /// Longest file that is read, in bytes; a camera takes a few hundred.
 const MAX_BYTES: u64 = 1 << 20;
-/// Largest picture in pixels.
 const MAX_PIXELS: u64 = 1 << 28;
 
 /// Reads a camera; also returns remarks about guessed fields.

@@ -17,9 +17,6 @@ pub struct Fields<'a> {
 
 impl<'a> Fields<'a> {
     /// The object at `place`, a prefix that a field's name completes.
-    ///
-    /// # Errors
-    /// The value is not an object.
     pub fn new(place: String, value: &'a Value) -> Result<Self> {
         match value {
             Value::Object(map) => Ok(Self { place, map }),
@@ -82,6 +79,19 @@ impl<'a> Fields<'a> {
             let numbers = <[f64; 3]>::try_from(numbers(value)?).ok()?;
             Some(DVec3::from(numbers)).filter(|v| v.is_finite())
         })
+    }
+
+    /// The entries of `frames`.
+    pub fn frames(&self) -> Result<&'a [Value]> {
+        let list = self.get("frames").and_then(Value::as_array);
+        let wrong = || {
+            Error::new(
+                self.place("frames"),
+                "is not a list of frames",
+                "add the photographs",
+            )
+        };
+        list.map(Vec::as_slice).ok_or_else(wrong)
     }
 
     pub fn matrix(&self, name: &str) -> Result<Option<Vec<Vec<f64>>>> {

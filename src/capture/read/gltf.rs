@@ -1,21 +1,16 @@
 //! Reads glTF and GLB: every node with a mesh becomes an object. Transforms are applied in f64; materials are ignored.
 
-use crate::capture::read::accessor::numbers;
+use crate::capture::read::RawMesh;
 use crate::capture::read::confine::Confine;
-use crate::capture::read::gltf_file::{self, Buffer};
+use crate::capture::read::gltf_file::{self, Buffer, numbers};
 use crate::capture::read::gltf_scene;
-use crate::capture::read::raw_mesh::RawMesh;
 use crate::error::{Error, Result};
 use ::gltf::accessor::Dimensions::{Scalar, Vec2 as Two, Vec3 as Three, Vec4 as Four};
 use ::gltf::{Node, Primitive, Semantic};
-use glam::{DMat4, DVec3, Vec2, Vec3};
+use glam::{DMat4, DVec2, DVec3, Vec2, Vec3};
 use std::path::Path;
 
 /// Reads the default scene (or the first, or all nodes where there is none).
-///
-/// # Errors
-/// The file cannot be read or breaks the format, needs an extension that is not supported, names buffers outside the
-/// capture's folder, or its nodes form no tree.
 pub fn read(path: &Path, confine: &Confine) -> Result<RawMesh> {
     let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
     let broken = |problem: String| Error::file(path, problem, "export the mesh again");
@@ -37,7 +32,6 @@ pub fn read(path: &Path, confine: &Confine) -> Result<RawMesh> {
     Ok(raw)
 }
 
-/// Adds a node's mesh as an object.
 fn add_node(
     raw: &mut RawMesh,
     node: &Node,
@@ -119,10 +113,8 @@ fn add_primitive(
     let uvs: Vec<Vec2> = match primitive.get(&Semantic::TexCoords(0)) {
         Some(accessor) => {
             let (values, _) = numbers(&accessor, buffers, &[Two])?;
-            values
-                .chunks_exact(2)
-                .map(|uv| Vec2::new(uv[0] as f32, uv[1] as f32))
-                .collect()
+            let uv = |uv: &[f64]| DVec2::from_slice(uv).as_vec2();
+            values.chunks_exact(2).map(uv).collect()
         }
         None => Vec::new(),
     };

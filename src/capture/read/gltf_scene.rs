@@ -7,8 +7,7 @@ use gltf::scene::Transform;
 use gltf::{Accessor, Gltf, Mesh, Node, Semantic};
 use std::collections::BTreeMap;
 
-/// Vertices that a scene may always have. Beyond it the limit is the size of the buffers in bytes, since nodes that share meshes
-/// could make a small file arbitrarily large.
+/// Vertices that a scene may always have; beyond, as many as the buffers have bytes: small files could share meshes without end.
 const MIN_VERTEX_LIMIT: usize = 1 << 25;
 
 /// The nodes of the default scene (or the first, or all nodes where there is none), parents before their children, each
@@ -70,7 +69,6 @@ fn roots(gltf: &Gltf) -> impl Iterator<Item = Node<'_>> {
     gltf.nodes().filter(move |node| !child[node.index()])
 }
 
-/// A node's transform, composed in f64.
 fn matrix(transform: &Transform) -> DMat4 {
     match *transform {
         Transform::Matrix { matrix } => {

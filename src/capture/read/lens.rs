@@ -21,9 +21,6 @@ const MAX_TANGENT: f64 = 2.5;
 /// Reads the lens of one frame for an image of `size` (width, height) pixels.
 ///
 /// Also returns remarks about guessed fields.
-///
-/// # Errors
-/// A lens model other than pinhole with k1 k2 p1 p2, no focal length, a size other than the image's, numbers out of range.
 pub fn read(
     shared: &Fields,
     frame: &Fields,

@@ -1,8 +1,8 @@
 //! Reads a mesh of any format, and the checks that all formats share.
 
 use crate::capture::mesh::Mesh;
+use crate::capture::read::RawMesh;
 use crate::capture::read::confine::Confine;
-use crate::capture::read::raw_mesh::RawMesh;
 use crate::capture::read::{gltf, obj, ply};
 use crate::error::{Error, Result};
 use crate::say::listed;
@@ -12,9 +12,6 @@ use std::collections::HashSet;
 use std::path::Path;
 
 /// Reads and checks a mesh.
-///
-/// # Errors
-/// The format is unknown, the file is broken, a vertex is not finite, an index is out of range, or there is no triangle.
 pub fn read(path: &Path, confine: &Confine, warnings: &mut Vec<String>) -> Result<RawMesh> {
     let extension = path
         .extension()

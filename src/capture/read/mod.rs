@@ -11,11 +11,9 @@
 //! Captures are untrusted: nothing outside the folder is opened unless allowed, and sizes in headers are checked against the
 //! file's length or the camera's size before memory is allocated.
 
-pub mod accessor;
 pub mod camera_file;
 pub mod confine;
 mod cut_short;
-mod exposure;
 pub(in crate::capture) mod fields;
 mod gltf;
 pub mod gltf_file;
@@ -25,12 +23,10 @@ pub(in crate::capture) mod lens;
 pub(in crate::capture) mod mesh;
 mod obj;
 mod ply;
-mod ply_elements;
 pub(in crate::capture) mod pose;
-mod raw_mesh;
 mod transforms;
 
-use crate::capture::read::raw_mesh::RawMesh;
+use crate::capture::mesh::Mesh;
 use crate::capture::reading::Reading;
 use crate::capture::{Capture, Segmentation};
 use crate::error::{Error, Result};
@@ -56,6 +52,19 @@ pub struct ReadOptions {
     pub reading: Reading,
     /// Whether paths in the capture may leave its folder.
     pub allow_outside: bool,
+}
+
+/// A mesh as a file stores it, before any check.
+#[derive(Debug, Default)]
+pub struct RawMesh {
+    /// Geometry and objects; names may repeat or be empty.
+    pub mesh: Mesh,
+    /// Whether the file assigns triangles to objects.
+    pub has_objects: bool,
+    /// Largest rounding error of a position due to the file's number format, in the capture's units.
+    pub rounding: f64,
+    /// Warnings, without the file's name.
+    pub warnings: Vec<String>,
 }
 
 /// Reads the capture in `folder`. Photographs are checked (they exist and have their camera's size) but not decoded.

@@ -1,10 +1,10 @@
 //! Reads Wavefront OBJ with tobj: every `o` or `g` is an object; equal names are one object. Material files are not opened.
 
+use crate::capture::read::RawMesh;
 use crate::capture::read::fields::without_bom;
-use crate::capture::read::raw_mesh::RawMesh;
 use crate::error::{Error, Result};
 use crate::say::listed;
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -12,9 +12,6 @@ use std::path::Path;
 const UNNAMED: &str = "unnamed_object";
 
 /// Reads an OBJ file; polygons become fans of triangles.
-///
-/// # Errors
-/// The file cannot be read or breaks the format; the message names the line.
 pub fn read(path: &Path) -> Result<RawMesh> {
     let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
     // Tolerate comments and names in other encodings than UTF-8.
@@ -79,10 +76,8 @@ pub fn read(path: &Path) -> Result<RawMesh> {
             mesh.vertex_colors.resize(mesh.positions.len(), Vec3::ONE);
         }
         if textured {
-            let uvs: Vec<Vec2> = part
-                .texcoords
-                .chunks_exact(2)
-                .map(|uv| Vec2::new(uv[0] as f32, uv[1] as f32))
+            let uvs: Vec<Vec2> = (part.texcoords.chunks_exact(2))
+                .map(|uv| DVec2::from_slice(uv).as_vec2())
                 .collect();
             let uv = |i: u32| uvs.get(i as usize).copied().unwrap_or_default();
             let corners = part.texcoord_indices.chunks_exact(3).map(corners);

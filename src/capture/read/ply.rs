@@ -4,24 +4,143 @@
 //! 3 wall` names object 3.
 
 use crate::capture::mesh::Mesh;
-use crate::capture::read::ply_elements::{Face, Skipped, Vertex};
-use crate::capture::read::raw_mesh::RawMesh;
+use crate::capture::read::RawMesh;
 use crate::error::{Error, Result};
-use glam::Vec2;
+use glam::{DVec3, Vec2, Vec3};
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
-use ply_rs_bw::ply::{ElementDef, Encoding, Header, PropertyType, ScalarType};
+use ply_rs_bw::ply::{
+    ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult,
+};
+use ply_rs_bw::ply::{PropertyType, ScalarType};
 use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-/// Longest header that is read, in bytes.
 const MAX_HEADER: u64 = 1 << 26;
 
+#[derive(Debug, Clone, Copy, Default)]
+struct Vertex {
+    position: DVec3,
+    /// red, green, blue, as linear values; integers are scaled to [0, 1].
+    color: Vec3,
+    /// s, t or u, v.
+    uv: Vec2,
+}
+
+/// An element of another kind; nothing of it is stored.
+struct Skipped;
+
+impl PropertyAccess for Skipped {
+    fn new() -> Self {
+        Self
+    }
+}
+
+#[derive(Debug, Clone, Default)]
+struct Face {
+    /// vertex_indices; `u32::MAX` for a negative one.
+    corners: Vec<u32>,
+    /// texcoord: u, v of each corner.
+    texcoord: Vec<f32>,
+    /// object_id, or else segment_id or face_segment (Matterport3D).
+    object_id: Option<i64>,
+}
+
+impl PropertyAccess for Vertex {
+    fn new() -> Self {
+        Self::default()
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        let (value, full_scale) = match property {
+            Property::Float(x) => (f64::from(x), 1.0),
+            Property::Double(x) => (x, 1.0),
+            Property::UChar(x) => (f64::from(x), 255.0),
+            Property::UShort(x) => (f64::from(x), 65535.0),
+            Property::Char(x) => (f64::from(x), 127.0),
+            Property::Short(x) => (f64::from(x), 32767.0),
+            Property::Int(x) => (f64::from(x), 1.0),
+            Property::UInt(x) => (f64::from(x), 1.0),
+            _ => return PropertyAccessResult::Ignored,
+        };
+        let color = (value / full_scale) as f32;
+        match name {
+            "x" => self.position.x = value,
+            "y" => self.position.y = value,
+            "z" => self.position.z = value,
+            "red" => self.color.x = color,
+            "green" => self.color.y = color,
+            "blue" => self.color.z = color,
+            "s" | "u" => self.uv.x = value as f32,
+            "t" | "v" => self.uv.y = value as f32,
+            _ => return PropertyAccessResult::Ignored,
+        }
+        PropertyAccessResult::Set
+    }
+}
+
+impl PropertyAccess for Face {
+    fn new() -> Self {
+        Self::default()
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        match name {
+            "vertex_indices" | "vertex_index" => match indices(property) {
+                Some(corners) => self.corners = corners,
+                None => return PropertyAccessResult::UnsupportedType,
+            },
+            "object_id" => match integer(&property) {
+                Some(id) => self.object_id = Some(id),
+                None => return PropertyAccessResult::UnsupportedType,
+            },
+            "segment_id" | "face_segment" if self.object_id.is_none() => {
+                self.object_id = integer(&property);
+            }
+            "texcoord" => match property {
+                Property::ListFloat(list) => self.texcoord = list,
+                Property::ListDouble(list) => {
+                    self.texcoord = list.iter().map(|&x| x as f32).collect();
+                }
+                _ => return PropertyAccessResult::UnsupportedType,
+            },
+            _ => return PropertyAccessResult::Ignored,
+        }
+        PropertyAccessResult::Set
+    }
+}
+
+/// Vertex indices from a list of any integer type.
+fn indices(property: Property) -> Option<Vec<u32>> {
+    fn convert<T: TryInto<u32>>(list: Vec<T>) -> Vec<u32> {
+        let index = |x: T| x.try_into().unwrap_or(u32::MAX);
+        list.into_iter().map(index).collect()
+    }
+    match property {
+        Property::ListInt(list) => Some(convert(list)),
+        Property::ListUInt(list) => Some(list),
+        Property::ListShort(list) => Some(convert(list)),
+        Property::ListUShort(list) => Some(convert(list)),
+        Property::ListChar(list) => Some(convert(list)),
+        Property::ListUChar(list) => Some(convert(list)),
+        _ => None,
+    }
+}
+
+fn integer(property: &Property) -> Option<i64> {
+    match *property {
+        Property::Char(x) => Some(x.into()),
+        Property::UChar(x) => Some(x.into()),
+        Property::Short(x) => Some(x.into()),
+        Property::UShort(x) => Some(x.into()),
+        Property::Int(x) => Some(x.into()),
+        Property::UInt(x) => Some(x.into()),
+        _ => None,
+    }
+}
+
 /// Reads a PLY file; polygons become fans of triangles.
-///
-/// # Errors
-/// The file cannot be read, breaks the format, or declares more elements than its bytes can hold.
 pub fn read(path: &Path) -> Result<RawMesh> {
     let file = File::open(path).map_err(|e| Error::io(path, &e))?;
     let length = file.metadata().map_err(|e| Error::io(path, &e))?.len();
@@ -231,7 +350,6 @@ fn object_names(header: &Header) -> HashMap<i64, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::{DVec3, Vec3};
 
     fn parse_bytes(bytes: &[u8]) -> Result<RawMesh> {
         parse(Path::new("mesh.ply"), bytes, bytes.len() as u64)

@@ -11,9 +11,6 @@ const MAX_SHEAR: f64 = 1e-2;
 const ROUNDING: f64 = 1e-4;
 
 /// The pose of a frame, and a remark if its matrix was corrected.
-///
-/// # Errors
-/// There is not a matrix, or it is not a rigid motion.
 pub fn of_frame(fields: &Fields) -> error::Result<(Pose, Option<String>)> {
     const NAME: &str = "transform_matrix";
     let place = fields.place(NAME);
@@ -119,22 +116,15 @@ mod tests {
         assert!(remark.is_some() && deviation(&pose.rotation) < 1e-14);
     }
 
+    /// Others are refused where a file holds them, by name.
     #[test]
-    fn what_is_no_rigid_motion_is_refused() {
-        let mut sheared = DMat3::IDENTITY;
-        sheared.x_axis.y = 0.5;
+    fn tiny_infinite_and_projective_matrices_are_refused() {
         for (m, word) in [
-            (DMat3::ZERO, "singular"),
-            (DMat3::from_diagonal(DVec3::new(1.0, 1.0, 0.0)), "singular"),
-            (DMat3::from_diagonal(DVec3::new(1.0, 1.0, -1.0)), "mirrors"),
-            (sheared, "rigid"),
-            (DMat3::IDENTITY * f64::NAN, "finite"),
             (DMat3::IDENTITY * 1e-200, "singular"),
+            (DMat3::IDENTITY * f64::NAN, "finite"),
         ] {
-            let problem = from_rows(&rows(m)).unwrap_err();
-            assert!(problem.contains(word), "{problem} should say {word}");
+            assert!(from_rows(&rows(m)).unwrap_err().contains(word));
         }
-        assert!(from_rows(&vec![vec![1.0; 4]; 2]).is_err());
         let mut projective = rows(DMat3::IDENTITY);
         projective[3][0] = 0.1;
         assert!(from_rows(&projective).is_err());

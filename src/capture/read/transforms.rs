@@ -2,11 +2,12 @@
 
 use crate::capture::Frame;
 use crate::capture::orientation::Orientation;
-use crate::capture::photograph::PhotographSource;
+use crate::capture::photograph::{Encoding, PhotographSource};
 use crate::capture::read::confine::Confine;
 use crate::capture::read::fields::{Fields, without_bom};
-use crate::capture::read::{CAMERAS, MESHES, exposure, image, lens, pose};
+use crate::capture::read::{CAMERAS, MESHES, image, lens, pose};
 use crate::error::{Error, Result};
+use crate::math::stats::quantile;
 use glam::DVec3;
 use rayon::prelude::*;
 use serde_json::Value;
@@ -74,10 +75,7 @@ fn read_frames(
     warnings: &mut Vec<String>,
 ) -> Result<Vec<Frame>> {
     let place = shared.place("frames");
-    let entries = shared
-        .get("frames")
-        .and_then(Value::as_array)
-        .ok_or_else(|| Error::new(&place, "is not a list of frames", "add the photographs"))?;
+    let entries = shared.frames()?;
     if entries.is_empty() {
         return Err(Error::new(&place, "is empty", "add the photographs"));
     }
@@ -107,7 +105,7 @@ fn read_frames(
             _ => format!("{place}[{first}] and {} more: {remark}", count - 1),
         });
     }
-    exposure::from_exif(&mut frames, &headers, &place, warnings);
+    exposures_from_exif(&mut frames, &headers, &place, warnings);
     Ok(frames)
 }
 
@@ -173,6 +171,36 @@ fn read_frame(
         depth,
     };
     Ok((frame, header, remarks))
+}
+
+/// Sets the exposure of 8- and 16-bit frames without an exposure field from EXIF, relative to the median frame.
+///
+/// Does so only if all such frames have an EXIF exposure: a mixture of known and unknown exposures is worse than none.
+fn exposures_from_exif(
+    frames: &mut [Frame],
+    headers: &[image::Header],
+    place: &str,
+    warnings: &mut Vec<String>,
+) {
+    let missing: Vec<(&mut Frame, Option<f64>)> = (frames.iter_mut().zip(headers))
+        .filter(|(frame, header)| frame.exposure.is_none() && header.encoding != Encoding::Linear)
+        .map(|(frame, header)| (frame, header.exif_exposure))
+        .collect();
+    let mut known: Vec<f64> = missing.iter().filter_map(|(_, exif)| *exif).collect();
+    let Some(median) = quantile(&mut known, 0.5) else {
+        return;
+    };
+    if known.len() < missing.len() {
+        warnings.push(format!(
+            "{place}: only {} of {} photographs have an EXIF exposure; none of them is used",
+            known.len(),
+            missing.len()
+        ));
+        return;
+    }
+    for (frame, exif) in missing {
+        frame.exposure = exif.map(|exposure| exposure / median);
+    }
 }
 
 /// The frame's depth image and its unit in metres, if there is one.

@@ -20,7 +20,6 @@ pub struct FaceGraph {
     /// Square roots of colours (as lightness is perceived), relative to the mesh's mean and with half of the brightness: from the
     /// photographs, or else from vertex colours; zero without either.
     pub color: Vec<DVec3>,
-    /// Whether a face belongs to a saturated patch.
     pub saturated: Vec<bool>,
     pub centroid: Vec<DVec3>,
     /// Pairs of faces that share an edge.

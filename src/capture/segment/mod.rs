@@ -10,7 +10,6 @@
 //! to the mesh's area and mean colour, so scale and exposure do not matter.
 
 mod graph;
-mod joined;
 mod sets;
 mod shown;
 mod ward;
@@ -18,6 +17,7 @@ mod ward;
 use crate::capture::mesh::Mesh;
 use graph::FaceGraph;
 use sets::Sets;
+use shown::MOSTLY;
 pub use shown::ShownFace;
 
 /// Felzenszwalb and Huttenlocher's k: the contrast tolerated by a segment with the area of the mean face.
@@ -31,8 +31,8 @@ pub fn segment(mesh: &mut Mesh, shown: &[ShownFace], wanted: Option<usize>) -> u
     let graph = FaceGraph::new(mesh, shown);
     let fine = fine_segments(&graph);
     let mut segment_of = ward::merge(&graph, &fine, wanted);
-    joined::join_saturated(&graph, shown, &mut segment_of);
-    let (segment_of, count) = joined::number_by_area(&graph, &segment_of);
+    join_saturated(&graph, shown, &mut segment_of);
+    let (segment_of, count) = number_by_area(&graph, &segment_of);
     mesh.object_of = segment_of;
     mesh.objects = (0..count).map(|i| format!("segment {i:03}")).collect();
     let mut saturated = vec![false; count];
@@ -75,6 +75,54 @@ fn fine_segments(graph: &FaceGraph) -> Vec<u32> {
         tolerance[root] = contrast + FINE_CONTRAST / total;
     }
     (0..count as u32).map(|face| sets.find(face)).collect()
+}
+
+/// Joins neighbouring segments that are saturated. `segment_of` holds a representative of each face's segment.
+///
+/// A lamp's normals cut it into pieces, and photographs tell only lower bounds of their radiance. The light in the room tells the
+/// sum of the pieces well, but not each of them.
+fn join_saturated(graph: &FaceGraph, shown: &[ShownFace], segment_of: &mut [u32]) {
+    let count = segment_of.len();
+    let mut pixels = vec![[0.0; 2]; count];
+    for (face, &segment) in shown.iter().zip(&*segment_of) {
+        let [saturated, all] = &mut pixels[segment as usize];
+        *saturated += f64::from(face.pixels) * f64::from(face.saturated);
+        *all += f64::from(face.pixels);
+    }
+    let is_saturated = |segment: u32| {
+        let [saturated, all] = pixels[segment as usize];
+        saturated > MOSTLY * all
+    };
+    let mut sets = Sets::new(count);
+    for edge in &graph.edges {
+        let [a, b] = edge.map(|face| segment_of[face as usize]);
+        if is_saturated(a) && is_saturated(b) {
+            sets.unite(a, b);
+        }
+    }
+    for segment in segment_of {
+        *segment = sets.find(*segment);
+    }
+}
+
+/// Numbers segments by descending area, ties by representative. Returns each face's number, and how many there are.
+fn number_by_area(graph: &FaceGraph, segment_of: &[u32]) -> (Vec<u32>, usize) {
+    let count = segment_of.len();
+    let mut areas = vec![0.0; count];
+    let mut used = vec![false; count];
+    for (&segment, area) in segment_of.iter().zip(&graph.area) {
+        areas[segment as usize] += area;
+        used[segment as usize] = true;
+    }
+    let mut order: Vec<u32> = (0..count as u32).filter(|&s| used[s as usize]).collect();
+    let area = |segment: u32| areas[segment as usize];
+    order.sort_by(|&a, &b| area(b).total_cmp(&area(a)));
+    let mut number = vec![0; count];
+    for (index, &segment) in (0..).zip(&order) {
+        number[segment as usize] = index;
+    }
+    let numbers = segment_of.iter().map(|&segment| number[segment as usize]);
+    (numbers.collect(), order.len())
 }
 
 #[cfg(test)]

@@ -8,10 +8,8 @@ use rstar::primitives::GeomWithData;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
-/// Default merging stops at a merge cost of this fraction of the mesh's area (times a unit squared difference of normal or
-/// colour).
+/// Default merging stops at a merge cost of this fraction of the mesh's area (times a unit squared difference of normal or colour).
 const MERGE_LIMIT: f64 = 5e-4;
-/// Maximum number of segments by default.
 const MAX_SEGMENTS: usize = 400;
 
 /// Outdated candidates are purged when the heap has twice as many entries as after the last purge, and more than twice this.

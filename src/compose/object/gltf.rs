@@ -1,7 +1,6 @@
 //! glTF 2.0 (.glb and .gltf): the triangles of the default scene with their metallic-roughness materials.
 
-use crate::capture::read::accessor::numbers;
-use crate::capture::read::gltf_file::{self, Buffer, ReadFile};
+use crate::capture::read::gltf_file::{self, Buffer, ReadFile, numbers};
 use crate::capture::read::gltf_scene;
 use crate::compose::object::files::TextureKind;
 use crate::compose::object::surface::{ObjectSurface, mean};

@@ -32,8 +32,7 @@ pub struct Change {
     pub value: Vec3,
 }
 
-/// A cluster's radiance due to its own object, from both sets of paths: `target` = albedo × `irradiance`, or emission ×
-/// `coverage`.
+/// A cluster's radiance due to its own object, from both sets of paths: `target` = albedo × `irradiance`, or emission × `coverage`.
 struct OwnRadiance {
     weight: DVec3,
     /// Channels in which the target is a lower bound.
@@ -128,7 +127,6 @@ struct RoleModels {
 }
 
 impl RoleModels {
-    /// `None` without clusters.
     fn new(clusters: &[OwnRadiance]) -> Option<Self> {
         if clusters.is_empty() {
             return None;
@@ -227,12 +225,10 @@ fn least_squares(
         for cluster in clusters {
             let [a, b] = regressor(cluster);
             let exceeded = (cluster.target[0] + cluster.target[1]).cmple(solution * (a + b));
-            let bound_met = cluster.censored
-                & if iteration == 0 {
-                    BVec3::TRUE
-                } else {
-                    exceeded
-                };
+            let bound_met = match iteration {
+                0 => cluster.censored,
+                _ => cluster.censored & exceeded,
+            };
             let weight = DVec3::select(bound_met, DVec3::ZERO, cluster.weight);
             numerator += weight * (a * cluster.target[1] + b * cluster.target[0]) * 0.5;
             denominator += weight * a * b;
@@ -296,8 +292,7 @@ mod tests {
         assert!((changes[0].value - Vec3::splat(8.0)).length() < 1e-5);
     }
 
-    /// One outlier path makes its cluster seem to receive a hundred times its irradiance. The other clusters still decide, for
-    /// the lamp and for the wall.
+    /// One outlier path makes its cluster seem to receive a hundred times its irradiance; the other clusters still decide.
     #[test]
     fn a_path_that_strays_decides_nothing() {
         let mut strayed = room();

@@ -62,99 +62,30 @@ impl Accumulated {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inverse::fit::equations::{Coupling, NormalEquations};
-    use crate::inverse::fit::prior::Prior;
-    use crate::inverse::fit::robust_weights::RobustWeights;
-    use crate::inverse::paths::clusters::Cluster;
-    use crate::inverse::paths::{CachedCluster, PathCache, Vertex};
-    use crate::inverse::unknowns::Unknowns;
-    use crate::math::rng::Stream;
-    use glam::Vec3;
+    use glam::DVec3;
 
-    const SURFACES: usize = 3;
-    const PIXELS: usize = 2;
-    const PATHS: usize = 2;
-    const ROUNDS: usize = 3;
-
-    /// One cluster with the given paths for each pixel and set.
-    fn cache(paths: impl Fn(usize, usize) -> Vec<Vec<Vertex>>) -> PathCache {
-        let (mut vertices, mut ends, mut count) = (Vec::new(), Vec::new(), 0);
-        for (pixel, set) in (0..PIXELS).flat_map(|p| [(p, 0), (p, 1)]) {
-            let paths = paths(pixel, set);
-            count = paths.len() as u32;
-            for path in paths {
-                vertices.extend(path);
-                ends.push(vertices.len() as u32);
-            }
-        }
-        let cluster = Cluster {
-            paths: count,
-            weight: Vec3::new(1.0, 2.0, 3.0),
-            ..Cluster::unit(0, PIXELS as u32, Vec3::new(0.5, 0.6, 0.7))
-        };
-        PathCache::from(vec![CachedCluster {
-            cluster,
-            vertices,
-            ends,
-        }])
-    }
-
-    /// The paths of one round through a pixel, of one set.
-    fn round(round: usize, pixel: usize, set: usize) -> Vec<Vec<Vertex>> {
-        (0..PATHS)
-            .map(|path| {
-                let key = ((round * PIXELS + pixel) * 2 + set) * PATHS + path;
-                Vertex::random_path(SURFACES, &mut Stream::new(51, 0, 0, key as u64))
-            })
-            .collect()
-    }
-
+    /// A parameter that one round alone meets counts as zero in the others.
     #[test]
-    fn rounds_add_up_to_the_normal_equations_of_all_their_paths() {
-        let unknowns = Unknowns {
-            albedo: vec![Vec3::new(0.3, 0.5, 0.8); SURFACES],
-            emission: vec![Vec3::new(1.0, 2.0, 0.5); SURFACES],
+    fn the_mean_over_rounds_is_that_of_residuals_and_of_all_derivatives() {
+        let round = |residuals: [f64; 2], rows: &[(usize, f64, f64)]| Linearised {
+            residuals: residuals.map(DVec3::splat),
+            own: DVec3::splat(rows[0].1),
+            rows: (rows.iter())
+                .map(|&(parameter, a, b)| (parameter, DVec3::splat(a), DVec3::splat(b)))
+                .collect(),
+            ..Linearised::unit(3, DVec3::ZERO)
         };
-        // All but one parameter are free.
-        let free: Vec<usize> = (0..2 * SURFACES).filter(|&p| p != 4).collect();
-        let mut row_of = vec![usize::MAX; 2 * SURFACES];
-        (free.iter().enumerate()).for_each(|(row, &p)| row_of[p] = row);
-
         let mut sums = Accumulated::default();
-        for r in 0..ROUNDS {
-            let cache = cache(|pixel, set| round(r, pixel, set));
-            sums.add(cache.linearise(&unknowns, &row_of, &[]));
-        }
-        assert_eq!(sums.rounds(), ROUNDS as u32);
-        let even = RobustWeights::even(SURFACES);
-        let prior = Prior::new(SURFACES, SURFACES, Vec3::ONE);
-        let found = NormalEquations::new(&sums.mean(), free.len(), &even, &prior);
-        let together = cache(|pixel, set| (0..ROUNDS).flat_map(|r| round(r, pixel, set)).collect());
-        let wanted = together.normal_equations(&unknowns, &free, &even, &prior);
-
-        assert_eq!(found.clusters, wanted.clusters);
-        assert!((found.objective - wanted.objective).length() < 1e-5);
-        let (Coupling::Dense(found_both), Coupling::Dense(wanted_both)) =
-            (&found.coupling, &wanted.coupling)
-        else {
-            panic!("so few parameters have matrices");
+        sums.add(vec![round([1.0, 3.0], &[(7, 4.0, 2.0), (2, 1.0, 5.0)])]);
+        sums.add(vec![round([5.0, 1.0], &[(2, 3.0, 1.0), (4, 6.0, 8.0)])]);
+        assert_eq!(sums.rounds(), 2);
+        let wanted = round([3.0, 2.0], &[(2, 2.0, 3.0), (4, 3.0, 4.0), (7, 2.0, 1.0)]);
+        let [found] = &sums.mean()[..] else {
+            panic!("there is one cluster");
         };
-        for c in 0..3 {
-            for (found, wanted) in [
-                (&found_both.hessian[c], &wanted_both.hessian[c]),
-                (&found_both.scatter()[c], &wanted_both.scatter()[c]),
-            ] {
-                assert!(wanted.amax() > 0.0);
-                assert!((found - wanted).amax() < 1e-5 * wanted.amax());
-            }
-        }
-        let size = wanted
-            .descent
-            .iter()
-            .map(|d| d.length())
-            .fold(0.0, f64::max);
-        for (found, wanted) in found.descent.iter().zip(&wanted.descent) {
-            assert!((*found - *wanted).length() < 1e-5 * size);
-        }
+        assert_eq!(found.residuals, wanted.residuals);
+        assert_eq!(found.rows, wanted.rows);
+        assert_eq!(found.own, DVec3::splat(3.5));
+        assert_eq!(found.object, 3);
     }
 }

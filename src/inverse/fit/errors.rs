@@ -16,7 +16,6 @@ use rayon::prelude::*;
 const DRAWS: u64 = 48;
 /// Relative residual of a draw's solution.
 const DRAW_TOLERANCE: f64 = 1e-2;
-/// Key of the draws.
 const KEY: u64 = 0x6d75_6c74;
 /// Number of parameters that are tested exactly without dense matrices.
 const MAX_EXACT: usize = 24;
@@ -64,8 +63,7 @@ impl ScoreTest {
 }
 
 /// Standard errors of the parameters in `free`: the sandwich estimator (H + P)⁻¹ (S + vP) (H + P)⁻¹ with the prior's precision P
-/// and the scatter S of the clusters' scores. It includes the noise of photographs and of paths for any distribution (Huber
-/// 1967).
+/// and the scatter S of the clusters' scores. It includes the noise of photographs and of paths for any distribution (Huber 1967).
 ///
 /// H contains the squared noise of the derivatives, which the descent does not. It would make parameters that few paths meet
 /// seem too certain, so errors are multiplied by the ratio of both curvatures, up to the prior's standard deviation.
@@ -138,19 +136,14 @@ fn quadratic(matrix: &DMatrix<f64>, cluster: &Linearised, channel: usize) -> f64
     let mut sum = 0.0;
     for (i, left) in cluster.rows.iter().map(slope) {
         let column = matrix.column(i);
-        let product: f64 = cluster
-            .rows
-            .iter()
-            .map(slope)
-            .map(|(j, right)| column[j] * right)
-            .sum();
+        let right = cluster.rows.iter().map(slope);
+        let product: f64 = right.map(|(j, right)| column[j] * right).sum();
         sum += left * product;
     }
     sum
 }
 
-/// A parameter's curvature without the noise of its derivatives, from [`NormalEquations::diagonal`] and
-/// [`NormalEquations::across`].
+/// A parameter's curvature without the noise of its derivatives, from `diagonal` and `across` of [`NormalEquations`].
 pub fn signal(diagonal: DVec3, across: DVec3) -> DVec3 {
     across.max(diagonal * MIN_SIGNAL)
 }
@@ -257,8 +250,7 @@ pub fn score_tests(equations: &NormalEquations, free: &[usize], active: usize) -
         Coupling::Sparse(rows) => eliminate_sparse(equations, rows, &prior, active),
     };
     (eliminated.into_iter().zip(active..))
-        .map(|(own, row)| {
-            let (curvature, variance) = own;
+        .map(|((curvature, variance), row)| {
             let zero = DVec3::ZERO;
             let known = curvature.cmpgt(equations.diagonal[row] * MIN_OWN) & curvature.cmpgt(zero);
             let stderr = variance.max(zero).sqrt() / curvature;
@@ -307,9 +299,8 @@ fn eliminate_dense(
         curvatures.chain((0..tested).map(variance)).collect()
     });
     let (curvatures, variances) = values.split_at(tested);
-    (curvatures.iter().copied())
-        .zip(variances.iter().copied())
-        .collect()
+    let pairs = curvatures.iter().zip(variances);
+    pairs.map(|(c, v)| (*c, *v)).collect()
 }
 
 /// As [`eliminate_dense`] for the parameters with the most significant scores; for the others nothing is eliminated.

@@ -227,13 +227,11 @@ mod tests {
     use super::*;
     use crate::inverse::paths::clusters::Cluster;
     use crate::inverse::paths::{CachedCluster, Vertex};
-    use crate::inverse::roles;
-    use crate::inverse::roles::Role;
+    use crate::inverse::roles::{self, Role};
     use crate::math::rng::Stream;
     use glam::Vec3;
 
-    /// Noise-free photographs of a lamp and a wall. One set of paths overestimates the light and the other underestimates it, so
-    /// that the product of their residuals is negative.
+    /// Noise-free photographs of a lamp and a wall. One set of paths overestimates the light, the other one underestimates it.
     fn opposed(index: usize) -> CachedCluster {
         let lamp = index.is_multiple_of(2);
         let off = [0.03, -0.03][index / 2 % 2];
@@ -265,8 +263,7 @@ mod tests {
         fit(&cache, start, &free, &even, &prior, 30, between).expect("nothing ends it")
     }
 
-    /// 300 lamps of radiance 1, each in two clusters with paths so noisy that the curvature across the sets is negative for some
-    /// lamps. These would grow with every step.
+    /// 300 lamps of radiance 1, each in two clusters with paths so noisy that some curvatures across the sets are negative.
     #[test]
     fn unknowns_that_few_paths_know_do_not_run_away() {
         const LAMPS: usize = 300;

@@ -11,7 +11,6 @@ use crate::inverse::unknowns::Unknowns;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Greatest number of steps.
 const MAX_STEPS: u32 = 12;
 
 /// The solution of a linearised fit.

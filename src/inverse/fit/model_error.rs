@@ -120,8 +120,7 @@ mod tests {
     use super::*;
     use crate::inverse::estimate::ObjectEstimate;
     use crate::math::rng::Stream;
-    /// Estimated error of clusters with an albedo of 0.5 and an irradiance of one, with an error that 50 neighbours share and
-    /// independent noise.
+    /// Estimated error of clusters of albedo 0.5 in unit irradiance, with an error that 50 neighbours share and independent noise.
     fn found(shared_error: f64, noise: f64) -> f64 {
         let mut stream = Stream::new(83, 0, 0, 0);
         let mut normal = || {

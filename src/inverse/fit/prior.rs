@@ -66,8 +66,7 @@ pub struct Prior {
 }
 
 impl Prior {
-    /// For `surfaces` surfaces, of which those from index `outside` stand for outside directions; `photographed` is the mean
-    /// radiance of all photographs.
+    /// For `surfaces` surfaces, from index `outside` on outside directions; `photographed` is the mean radiance of all photographs.
     pub fn new(surfaces: usize, outside: usize, photographed: Vec3) -> Self {
         Self {
             surfaces,

@@ -17,8 +17,7 @@ use rayon::prelude::*;
 const PRIOR_CLUSTERS: f64 = 2.0;
 /// Least relative error of a pixel: cameras and meshes are no better.
 const FLOOR: f64 = 1e-3;
-/// Least variance of an object as a fraction of the typical one. Objects that are nearly black in a channel have almost no
-/// residuals and would dominate the fit.
+/// Least variance of an object over the typical one: objects that are nearly black have almost no residuals and would dominate.
 const MIN_OF_TYPICAL: f64 = 1e-2;
 /// Median of χ² with one degree of freedom.
 const MEDIAN_CHI2: f64 = 0.454_936;
@@ -100,11 +99,6 @@ impl RobustWeights {
         let bounded = DVec3::select(square.cmpgt(max), (max / square).powf(0.5), DVec3::ONE);
         cluster.weight_now() * robust.factor * bounded
     }
-
-    /// The factor of one object.
-    pub fn factor(&self, object: u32) -> DVec3 {
-        self.0[object as usize].factor
-    }
 }
 
 /// The variance of a normal distribution with the same median of squares; zero without values.
@@ -118,8 +112,7 @@ fn square(cluster: &Linearised, step: DVec3) -> DVec3 {
     cluster.weight * residual * residual
 }
 
-/// For each object and channel, the step of its own parameter that minimises the absolute residuals of its clusters: a weighted
-/// median, robust to outliers.
+/// For each object and channel, the step of its own parameter of least absolute residuals: a weighted median, robust to outliers.
 fn own_steps(clusters: &[Linearised], objects: usize) -> Vec<DVec3> {
     let mut of_object: Vec<Vec<&Linearised>> = vec![Vec::new(); objects];
     for cluster in clusters {
@@ -168,10 +161,10 @@ mod tests {
             );
         };
         // The typical variance counts for two clusters and the object's for 100, which keeps the ratio below 100.
-        between(robust.factor(1) / robust.factor(0), [8.0, 100.0]);
+        between(robust.0[1].factor / robust.0[0].factor, [8.0, 100.0]);
         // The same for the noisy object: 100 to the power of 100/102; the typical variance is a little above the first object's.
-        between(robust.factor(0) / robust.factor(2), [90.0, 95.0]);
-        assert_eq!(robust.factor(3), DVec3::ONE);
+        between(robust.0[0].factor / robust.0[2].factor, [90.0, 95.0]);
+        assert_eq!(robust.0[3].factor, DVec3::ONE);
     }
 
     #[test]
@@ -185,9 +178,9 @@ mod tests {
         }
         let [quiet, disturbed] = [&quiet, &edges].map(|c| RobustWeights::from_residuals(c, 2));
         // One of 40 clusters counts for ten deviations; unbounded, the factor would fall to a 50,000th.
-        assert!((disturbed.factor(1) / quiet.factor(1)).min_element() > 0.15);
+        assert!((disturbed.0[1].factor / quiet.0[1].factor).min_element() > 0.15);
         let influence = |cluster: &Linearised| disturbed.weight(cluster) * cluster.residuals[0];
-        let usual = disturbed.factor(1) * 0.1;
+        let usual = disturbed.0[1].factor * 0.1;
         let ratio = (influence(&edges[400]) / usual).x;
         // Ten deviations, which the cluster itself doubles, instead of 500.
         assert!((10.0..30.0).contains(&ratio), "{ratio}");
@@ -205,7 +198,8 @@ mod tests {
                 *residual += cluster.own * 0.8;
             }
         }
-        let [right, wrong] = [right, wrong].map(|c| RobustWeights::from_residuals(&c, 2).factor(1));
+        let [right, wrong] =
+            [right, wrong].map(|c| RobustWeights::from_residuals(&c, 2).0[1].factor);
         let gained = wrong / right - DVec3::ONE;
         assert!(gained.abs().max_element() < 0.03, "{gained}");
     }
@@ -237,7 +231,12 @@ mod tests {
             .collect();
         let robust = RobustWeights::from_residuals(&all, 2);
         // The factor of an object without residuals is limited to 100.
-        assert!((robust.factor(1) - DVec3::splat(100.0)).abs().max_element() < 1e-9);
+        assert!(
+            (robust.0[1].factor - DVec3::splat(100.0))
+                .abs()
+                .max_element()
+                < 1e-9
+        );
         let bound_met: Vec<Linearised> = clusters(0, noise(10, 0.0)).collect();
         for (clusters, objects) in [(&bound_met[..], 1), (&[], 2)] {
             let found = RobustWeights::from_residuals(clusters, objects);

@@ -21,7 +21,6 @@ const KEY: u64 = 9 << 59;
 pub struct Gathering<'a> {
     /// The scene with its present estimate.
     pub lit: &'a LitScene,
-    /// The object whose pixels are sampled.
     pub object: u32,
     /// Points per observation in each of two sets.
     pub points: u32,
@@ -108,8 +107,7 @@ impl Gathering<'_> {
             index_in_pixels = point * count / self.points + within;
         }
         let pixel = observation.pixels[(index_in_pixels % count) as usize];
-        let width = camera.intrinsics.width;
-        let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
+        let corner = camera.corner(pixel as usize);
         let ray = camera.ray(corner + Vec2::from_array(stream.uniform2()));
         let mut cast = RayCount {
             rays: 1,

@@ -31,7 +31,6 @@ const MIN_EVIDENCE: f64 = 5.0;
 const SIGNIFICANT: f64 = 4.0;
 /// Points per observation in screening, in each of two sets.
 const SCREENED_POINTS: u32 = 2;
-/// Greatest number of bounces in screening.
 const SCREENED_BOUNCES: u32 = 2;
 /// Greatest number of observations of an object in the fit.
 const MAX_OBSERVATIONS: usize = 1200;
@@ -50,19 +49,6 @@ const SECOND_TRIAL_PATHS: u64 = 4;
 const SECOND_TRIAL: u64 = 2;
 /// Greatest ratio between the roughness of the last fit and the sampled one.
 const NEAR: f64 = 2.0;
-
-/// The inputs of the search for lobes.
-#[derive(Debug, Clone, Copy)]
-pub struct Task<'a> {
-    /// Scene and photographs.
-    pub problem: &'a Problem,
-    /// Seed of the random streams.
-    pub seed: u64,
-    /// Approximate number of paths for each fit of an object.
-    pub paths: u64,
-    /// Greatest number of bounces.
-    pub max_bounces: u32,
-}
 
 /// The best lobe of an object.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -118,17 +104,29 @@ pub type Report<'t> = dyn FnMut(RayCount) -> Result<(), Termination> + 't;
 
 /// The search for lobes over the spots of all objects.
 pub struct Lobes<'a> {
-    /// Its inputs.
-    pub task: Task<'a>,
+    problem: &'a Problem,
+    seed: u64,
+    /// Approximate number of paths for each fit of an object.
+    pub paths: u64,
+    max_bounces: u32,
     spots: Vec<Vec<Spot>>,
 }
 
 impl<'a> Lobes<'a> {
-    /// Groups the pixels into spots.
-    pub fn new(task: Task<'a>, gbuffer: &GBuffer) -> Self {
+    /// Groups the pixels into spots. Paths have at most `max_bounces` bounces.
+    pub fn new(
+        problem: &'a Problem,
+        gbuffer: &GBuffer,
+        seed: u64,
+        paths: u64,
+        max_bounces: u32,
+    ) -> Self {
         Self {
-            spots: observations::spots(task.problem, gbuffer),
-            task,
+            problem,
+            seed,
+            paths,
+            max_bounces,
+            spots: observations::spots(problem, gbuffer),
         }
     }
 
@@ -144,10 +142,10 @@ impl<'a> Lobes<'a> {
             points: SCREENED_POINTS,
             roughnesses,
             options: PathOptions {
-                max_bounces: self.task.max_bounces,
+                max_bounces: self.max_bounces,
                 ..PathOptions::default()
             },
-            seed: self.task.seed,
+            seed: self.seed,
             pass: 0,
         }
     }
@@ -163,14 +161,14 @@ impl<'a> Lobes<'a> {
         objects: &[usize],
         report: &mut Report,
     ) -> Result<Vec<Option<f64>>, Termination> {
-        let lit = estimate.lit(&self.task.problem.scene);
+        let lit = estimate.lit(&self.problem.scene);
         let mut all = Vec::with_capacity(objects.len());
         for &object in objects {
             let mut gathering = self.gathering(&lit, object, &screen::DRAWN);
-            gathering.options.max_bounces = SCREENED_BOUNCES.min(self.task.max_bounces);
+            gathering.options.max_bounces = SCREENED_BOUNCES.min(self.max_bounces);
             // Emitters have albedo zero; a small one is assumed.
             let albedo = estimate.objects[object].albedo.max(Vec3::splat(0.05));
-            let scene = &self.task.problem.scene;
+            let scene = &self.problem.scene;
             let (evidence, cast) =
                 screen::evidence(&gathering, scene, &self.spots[object], albedo.as_dvec3());
             report(cast)?;
@@ -183,7 +181,7 @@ impl<'a> Lobes<'a> {
     fn points(&self, object: usize, lobes: usize, (min, max): (u64, u64)) -> u32 {
         let chosen = observations::choose(&self.spots[object], 1, MAX_OBSERVATIONS);
         let observations: usize = chosen.iter().map(|spot| spot.len()).sum();
-        let points = self.task.paths / (2 * (1 + lobes) * observations.max(1)) as u64;
+        let points = self.paths / (2 * (1 + lobes) * observations.max(1)) as u64;
         points.clamp(min, max) as u32
     }
 
@@ -206,11 +204,11 @@ impl<'a> Lobes<'a> {
         let first = self.find(lit, object, emits, None, report)?;
         match first {
             Some(found) if found.is_likely() && !found.is_significant() => {
-                let paths = self.task.paths;
-                self.task.paths = paths * SECOND_TRIAL_PATHS;
+                let paths = self.paths;
+                self.paths = paths * SECOND_TRIAL_PATHS;
                 let second = Some((found.lobe(), SECOND_TRIAL));
                 let found = self.find(lit, object, emits, second, report);
-                self.task.paths = paths;
+                self.paths = paths;
                 found
             }
             _ => Ok(first),
@@ -230,30 +228,25 @@ impl<'a> Lobes<'a> {
         known: Option<(Lobe, u64)>,
         report: &mut Report,
     ) -> Result<Option<LobeFit>, Termination> {
-        let scene = &self.task.problem.scene;
+        let scene = &self.problem.scene;
         let spots = &self.spots[object];
+        let mut within = |bounds, drawn: &[f64], points, pass| -> Result<_, Termination> {
+            let mut gathering = self.gathering(lit, object, drawn);
+            gathering.points = self.points(object, drawn.len(), points);
+            gathering.pass = pass;
+            let (observations, cast) =
+                LitObservations::new(&gathering, scene, spots, MAX_OBSERVATIONS);
+            report(cast)?;
+            Ok(find(&observations, emits, bounds))
+        };
         let (roughness, pass, points) = match known {
             Some((lobe, refit)) => (f64::from(lobe.roughness), 3 + refit, REFIT_POINTS),
-            None => {
-                let mut gathering = self.gathering(lit, object, &FIRST_DRAWN);
-                gathering.points = self.points(object, FIRST_DRAWN.len(), FIRST_POINTS);
-                gathering.pass = 1;
-                let (observations, cast) =
-                    LitObservations::new(&gathering, scene, spots, MAX_OBSERVATIONS);
-                report(cast)?;
-                match find(&observations, emits, [0.0, 1.0]) {
-                    Some(first) => (first.roughness, 2, SECOND_POINTS),
-                    None => return Ok(None),
-                }
-            }
+            None => match within([0.0, 1.0], &FIRST_DRAWN, FIRST_POINTS, 1)? {
+                Some(first) => (first.roughness, 2, SECOND_POINTS),
+                None => return Ok(None),
+            },
         };
-        let drawn = [roughness];
-        let mut gathering = self.gathering(lit, object, &drawn);
-        gathering.points = self.points(object, drawn.len(), points);
-        gathering.pass = pass;
-        let (observations, cast) = LitObservations::new(&gathering, scene, spots, MAX_OBSERVATIONS);
-        report(cast)?;
         let near = [roughness / NEAR, roughness * NEAR];
-        Ok(find(&observations, emits, near))
+        within(near, &[roughness], points, pass)
     }
 }

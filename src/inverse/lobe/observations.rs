@@ -1,7 +1,6 @@
 //! Spots of a surface, and their observations by each photograph.
 //!
-//! A diffuse spot has the same radiance in all views, whatever its texture. Differences between photographs of one spot
-//! therefore indicate gloss.
+//! A diffuse spot has the same radiance in all views, so that differences between photographs of one spot indicate gloss.
 
 use crate::calibrate::gbuffer::GBuffer;
 use crate::calibrate::measured_radiance::cell_key;

@@ -8,13 +8,9 @@ use crate::transport::arrival::RayCount;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Greatest number of observations of an object.
 const MAX_OBSERVATIONS: usize = 600;
-/// Least number of observations of an object.
 const MIN_OBSERVATIONS: usize = 12;
-/// GGX roughnesses that are tested.
 const ROUGHNESSES: [f64; 3] = [0.1, 0.25, 0.6];
-/// Specular reflectance that is tested.
 const SPECULAR: f64 = 0.1;
 /// Expected differences are clamped to this multiple of their 68th percentile.
 const CLIP: f64 = 5.0;
@@ -136,12 +132,11 @@ fn strength(all: &[Difference], spots: usize) -> Option<f64> {
         dy += w * d.dot(y);
         yy += w * y.dot(y);
     }
-    let (own, score) = if dd > 0.0 {
-        (xx - xd * xd / dd, xy - xd * dy / dd)
+    let (own, score, explained) = if dd > 0.0 {
+        (xx - xd * xd / dd, xy - xd * dy / dd, dy * dy / dd)
     } else {
-        (xx, xy)
+        (xx, xy, 0.0)
     };
-    let explained = if dd > 0.0 { dy * dy / dd } else { 0.0 };
     // The channels of an observation are strongly correlated, so they count once.
     let freedom = all.len().checked_sub(spots + 2).filter(|&n| n > 0)? as f64;
     let slope = score / own;

@@ -18,7 +18,6 @@ const MIN_ROUGHNESS: f64 = 0.03;
 const SAFETY: f64 = 2.0;
 /// Halvings of the step of the line search between candidates.
 const HALVINGS: u32 = 5;
-/// Folds of the cross-validation over spots.
 const FOLDS: usize = 4;
 /// Fraction of the median level below which weights stop growing.
 const DARK: f64 = 0.5;
@@ -112,11 +111,8 @@ fn levels(observations: &[(usize, &SpotObservation, [Gathered; 2])]) -> Vec<DVec
         .collect()
 }
 
-struct Candidate {
-    alpha: f64,
-    rows: Vec<Row>,
-    held_out: Vec<Row>,
-}
+/// A roughness, and its rows in the fit and the held-out ones.
+type Candidate = (f64, [Vec<Row>; 2]);
 
 /// Finds the best lobe with a roughness between the given bounds, and its gain over a diffuse surface, which may emit light if
 /// `emits`. `None` if the observations do not determine the models.
@@ -128,21 +124,16 @@ pub fn find(observations: &LitObservations, emits: bool, [from, to]: [f64; 2]) -
     let candidates: Vec<Candidate> = (0..CANDIDATES)
         .map(|i| {
             let alpha = (from * ratio.powi(i as i32)).min(to);
-            let [rows, held_out] = observations.rows(alpha);
-            Candidate {
-                alpha,
-                rows,
-                held_out,
-            }
+            (alpha, observations.rows(alpha))
         })
         .collect();
 
     // The variances, first by a diffuse surface, then by the best lobe.
-    let flat = diffuse.fit(&candidates[0].rows)?;
-    let diffuse_variances = diffuse.variances(&candidates[0].rows, &flat);
-    let (first, parameters, _) = best(&candidates, &diffuse_variances, |_| true)?;
-    let variances = Model::Lobe.variances(&candidates[first].rows, &parameters);
-    let (index, _, _) = best(&candidates, &variances, |_| true)?;
+    let rows = &candidates[0].1[0];
+    let diffuse_variances = diffuse.variances(rows, &diffuse.fit(rows)?);
+    let ((_, [rows, _]), parameters) = best(&candidates, &diffuse_variances, |_| true)?;
+    let variances = Model::Lobe.variances(rows, &parameters);
+    let (&(mut alpha, _), _) = best(&candidates, &variances, |_| true)?;
 
     // Line search between the candidates.
     let error_at = |alpha: f64| -> Option<(f64, Vec<f64>)> {
@@ -151,7 +142,6 @@ pub fn find(observations: &LitObservations, emits: bool, [from, to]: [f64; 2]) -
         let parameters = Model::Lobe.fit(&rows)?;
         Some((Model::Lobe.error(&rows, &parameters), parameters))
     };
-    let mut alpha = candidates[index].alpha;
     let mut lowest = error_at(alpha)?;
     let mut step = ratio.sqrt();
     for _ in 0..HALVINGS {
@@ -172,28 +162,27 @@ pub fn find(observations: &LitObservations, emits: bool, [from, to]: [f64; 2]) -
     let mut by_view = Vec::new();
     for fold in 0..FOLDS {
         let inside = |row: &Row| row.spot % FOLDS != fold;
-        let Some((index, lobe, _)) = best(&candidates, &variances, inside) else {
+        let Some(((_, [rows, held_out]), lobe)) = best(&candidates, &variances, inside) else {
             continue;
         };
-        let candidate = &candidates[index];
         let select = |rows: &[Row], fitted: bool| -> Vec<Row> {
             (rows.iter().filter(|r| inside(r) == fitted))
                 .copied()
                 .collect()
         };
-        let fitted = diffuse_variances.decorrelate(&select(&candidate.rows, true));
+        let fitted = diffuse_variances.decorrelate(&select(rows, true));
         let Some(flat) = diffuse.fit(&fitted) else {
             continue;
         };
-        let left_out = select(&candidate.rows, false);
+        let left_out = select(rows, false);
         let compare = |rows: &[Row], into: &mut Vec<f64>| {
             for spot in rows.chunk_by(|a, b| a.spot == b.spot) {
                 into.push(diffuse.error(spot, &flat) - Model::Lobe.error(spot, &lobe));
             }
         };
         compare(&diffuse_variances.decorrelate(&left_out), &mut gains);
-        let held_out = select(&candidate.held_out, false);
-        compare(&diffuse_variances.decorrelate(&held_out), &mut gains);
+        let held_out = diffuse_variances.decorrelate(&select(held_out, false));
+        compare(&held_out, &mut gains);
         let several: Vec<Row> = (left_out.chunk_by(|a, b| a.spot == b.spot))
             .filter(|spot| spot.len() > 1)
             .flatten()
@@ -213,16 +202,16 @@ pub fn find(observations: &LitObservations, emits: bool, [from, to]: [f64; 2]) -
     })
 }
 
-/// The candidate with the least error on the rows selected by `inside`: its index, parameters and error. [`SAFETY`] standard
-/// deviations are added to errors, since roughnesses far from the sampled ones are noisy.
-fn best(
-    candidates: &[Candidate],
+/// The candidate with the least error on the rows selected by `inside`, and its parameters. [`SAFETY`] standard deviations are
+/// added to errors, since roughnesses far from the sampled ones are noisy.
+fn best<'a>(
+    candidates: &'a [Candidate],
     variances: &Variances,
     inside: impl Fn(&Row) -> bool + Sync,
-) -> Option<(usize, Vec<f64>, f64)> {
-    let fits: Vec<Option<(usize, Vec<f64>, f64)>> = (candidates.par_iter().enumerate())
-        .map(|(index, candidate)| {
-            let rows = candidate.rows.iter().filter(|r| inside(r));
+) -> Option<(&'a Candidate, Vec<f64>)> {
+    let fits: Vec<Option<(f64, &Candidate, Vec<f64>)>> = (candidates.par_iter())
+        .map(|candidate| {
+            let rows = candidate.1[0].iter().filter(|r| inside(r));
             let rows = variances.decorrelate(&rows.copied().collect::<Vec<_>>());
             let parameters = Model::Lobe.fit(&rows)?;
             let errors: Vec<f64> = (rows.chunk_by(|a, b| a.spot == b.spot))
@@ -230,10 +219,12 @@ fn best(
                 .collect();
             let scatter: f64 = errors.iter().map(|e| e * e).sum();
             let error = errors.iter().sum::<f64>() + SAFETY * scatter.sqrt();
-            Some((index, parameters, error))
+            Some((error, candidate, parameters))
         })
         .collect();
-    (fits.into_iter().flatten()).min_by(|a, b| a.2.total_cmp(&b.2))
+    (fits.into_iter().flatten())
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, candidate, parameters)| (candidate, parameters))
 }
 
 /// Mean and standard error of spots' gains, with clamped outliers.

@@ -9,7 +9,7 @@ use crate::inverse::settings::Settings;
 use crate::math::rng::Stream;
 use crate::scene::geometry::Hit;
 use crate::transport::arrival::RayCount;
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 
 /// Greatest number of pixels; above it every n-th pixel is used.
@@ -42,10 +42,9 @@ impl Cover {
             if held_out || !photograph.is_usable(pixel) {
                 return None;
             }
-            let width = photograph.width as usize;
-            let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
             let camera = &problem.scene.cameras[frame];
-            let hit = problem.scene.intersect(&camera.ray(corner + 0.5))?;
+            let center = camera.corner(pixel) + 0.5;
+            let hit = problem.scene.intersect(&camera.ray(center))?;
             Some((frame as u32, pixel as u32, hit))
         };
         let visited = 0..problem.pixels().div_ceil(stride);
@@ -59,15 +58,14 @@ impl Cover {
     pub fn counts(&self, patches: &Patches) -> Vec<u64> {
         let mut counts = vec![0; patches.len()];
         for (_, _, hit) in &self.pixels {
-            counts[patches.of_texel(patches.layout().texel(hit))] += self.stride;
+            counts[patches.of_texel(patches.layout.texel(hit))] += self.stride;
         }
         counts
     }
 
     /// Selects the patches to cut by the mean squared error of the pixels that they cover. Also returns the rays cast.
     ///
-    /// The squared error of a pixel, summed over the channels, is the product of the residuals of two independent colours, whose
-    /// expectation is free of path noise.
+    /// The squared error of a pixel is the product of the residuals of two independent colours, which is free of path noise.
     pub fn to_cut(
         &self,
         problem: &Problem,
@@ -104,11 +102,11 @@ impl Cover {
         };
         let mut sums = vec![(0.0, 0u64); patches.len()];
         for ((_, _, hit), (error, _)) in self.pixels.iter().zip(each) {
-            let sum = &mut sums[patches.of_texel(patches.layout().texel(hit))];
+            let sum = &mut sums[patches.of_texel(patches.layout.texel(hit))];
             sum.0 += error;
             sum.1 += self.stride;
         }
-        (worst(&sums, patches.depth()), cast)
+        (worst(&sums, &patches.depth), cast)
     }
 }
 

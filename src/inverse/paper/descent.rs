@@ -1,7 +1,6 @@
 //! The state of the descent and one step of it.
 
 use crate::calibrate::problem::Problem;
-use crate::inverse::estimate::TexelEstimate;
 use crate::inverse::known::Known;
 use crate::inverse::paper::adam::Adam;
 use crate::inverse::paper::pace::Pace;
@@ -14,11 +13,10 @@ use crate::math::rng::Stream;
 use crate::scene::Scene;
 use crate::transport::arrival::RayCount;
 use crate::transport::emitters::{Emitters, powers};
-use crate::transport::material::{Lobe, TexelColors};
+use crate::transport::material::Lobe;
 use glam::Vec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 
 /// Batches of at least this many paths are traced in parallel.
 const PARALLEL: u64 = 128;
@@ -54,15 +52,7 @@ pub struct Descent {
     #[serde(skip)]
     fixed: Vec<bool>,
     #[serde(skip)]
-    caches: Option<Caches>,
-}
-
-/// Data for tracing, derived from the state.
-#[derive(Debug, Clone)]
-struct Caches {
-    emitters: Emitters,
-    /// The texels of the patches.
-    grid: Option<Arc<TexelEstimate>>,
+    emitters: Option<Emitters>,
 }
 
 /// The outcome of one step.
@@ -92,7 +82,7 @@ impl Descent {
             steps: 0,
             lobes: Vec::new(),
             fixed: Vec::new(),
-            caches: None,
+            emitters: None,
         }
     }
 
@@ -151,7 +141,7 @@ impl Descent {
             patches: Some(patches),
             level: 0,
             fixed: Vec::new(),
-            caches: None,
+            emitters: None,
             ..self.clone()
         }
     }
@@ -196,16 +186,16 @@ impl Descent {
     /// Sets the emission of all objects.
     pub fn set_emission(&mut self, emission: Vec<Vec3>) {
         self.emission = emission;
-        self.caches = None;
+        self.emitters = None;
     }
 
     /// Sets the emission of an object, and its weight for light sampling.
     fn set_object_emission(&mut self, scene: &Scene, object: usize, emission: Vec3) {
         if self.emission[object] != emission {
             self.emission[object] = emission;
-            if let Some(caches) = &mut self.caches {
+            if let Some(emitters) = &mut self.emitters {
                 let area = scene.objects[object].area;
-                (caches.emitters).set_weight(object, area * f64::from(luminance(emission)));
+                emitters.set_weight(object, area * f64::from(luminance(emission)));
             }
         }
     }
@@ -262,8 +252,7 @@ impl Descent {
             return outcome;
         }
 
-        // Step the parameters that were met. The penalty also acts on emission that no path met. Once there are patches, objects
-        // without emission stay dark.
+        // Step what was met. The penalty also acts on emission that no path met. With patches, objects without emission stay dark.
         let rate = pace.rate(settings, self.steps) as f32;
         self.steps += 1;
         for index in 0..albedos {
@@ -294,32 +283,20 @@ impl Descent {
         bounces: u32,
         work: impl FnOnce(&Rendering) -> T,
     ) -> T {
-        let (scene, objects) = (&*problem.scene, self.emission.len());
-        let caches = self.caches.get_or_insert_with(|| {
-            let weights = powers(scene, self.emission.iter().copied());
-            let grid = self.patches.as_ref().map(|patches| TexelEstimate {
-                colors: Arc::new(TexelColors {
-                    layout: patches.layout().clone(),
-                    colors: Vec::new(),
-                }),
-                stderr: Vec::new(),
-                seen: Vec::new(),
-                textured: vec![true; objects],
-            });
-            Caches {
-                emitters: Emitters::new(scene, &weights),
-                grid: grid.map(Arc::new),
-            }
+        let scene = &*problem.scene;
+        let emitters = self.emitters.get_or_insert_with(|| {
+            Emitters::new(scene, &powers(scene, self.emission.iter().copied()))
         });
+        let patches = self.patches.as_ref();
         work(&Rendering {
             problem,
             tracer: Tracer {
                 scene,
-                lights: &caches.emitters,
+                lights: emitters,
                 measured: None,
                 surface_of: &scene.object_of,
                 expected_albedo: &self.believed,
-                texels: caches.grid.as_deref(),
+                texels: patches.map(|patches| (&patches.layout, None)),
                 lobes: &self.lobes,
                 patches: None,
                 sky: None,
@@ -330,7 +307,7 @@ impl Descent {
                 stage: 0,
                 round: 0,
             },
-            patches: self.patches.as_ref(),
+            patches,
             albedo: &self.albedo,
             emission: &self.emission,
         })

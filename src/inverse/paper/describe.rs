@@ -44,10 +44,10 @@ pub fn describe(
     let own = &descent.albedo[scene.objects.len()..];
     let texels = descent.patches.as_ref().map(|patches| TexelEstimate {
         colors: Arc::new(TexelColors {
-            layout: patches.layout().clone(),
+            layout: patches.layout.clone(),
             colors: patches.spread(own),
         }),
-        stderr: vec![Vec3::ONE; patches.layout().len()],
+        stderr: vec![Vec3::ONE; patches.layout.len()],
         seen: (patches.spread(covered).into_iter())
             .map(|pixels| u32::try_from(pixels).unwrap_or(u32::MAX))
             .collect(),

@@ -1,8 +1,7 @@
 //! The stochastic gradient descent of the paper (Azinović et al. 2019): ADAM on small batches of pixels. First each object has
 //! an albedo, then each triangle, with fixed lamps, then parts of triangles, which are cut where their pixels are worst.
 //!
-//! A stage keeps the state with the least loss on held-out pixels, including its start. Triangles are cut until that gains
-//! nothing.
+//! A stage keeps the state with the least loss on held-out pixels, including its start. Triangles are cut until that gains nothing.
 
 pub mod adam;
 mod cover;
@@ -36,27 +35,22 @@ use std::time::{Duration, Instant};
 const LOSS_PIXELS: usize = 1000;
 /// All pixels over the pixels in each set of the loss.
 const LOSS_FRACTION: usize = 32;
-/// Paths per pixel of the loss.
 const LOSS_SAMPLES: u64 = 32;
 /// Interval between estimates once there are patches: each allocates a colour per texel.
 const DESCRIBE_EVERY: Duration = Duration::from_millis(200);
 
-/// The state in a checkpoint.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct State {
     descent: Descent,
     schedule: Schedule,
-    /// The best values of this stage so far.
     best: Option<Best>,
     /// Number of stages that cut triangles.
     cuts: u32,
-    /// Number of consecutive stages without a gain.
     fruitless: u32,
     /// Seconds and iterations at the start of the present stage.
     stage_started: (f64, u64),
 }
 
-/// A running descent.
 struct Run<'a, 'o> {
     problem: &'a Problem,
     monitor: Monitor<'o>,
@@ -136,7 +130,6 @@ pub fn solve(
 }
 
 impl Run<'_, '_> {
-    /// Updates the estimate from the present state.
     fn describe(&mut self) {
         self.described = Instant::now();
         let (descent, covered) = (&self.state.descent, &self.covered);

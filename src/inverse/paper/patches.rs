@@ -14,10 +14,10 @@ pub const MAX_DEPTH: u8 = 8;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(from = "Stored", into = "Stored")]
 pub struct Patches {
-    layout: TexelLayout,
+    pub layout: TexelLayout,
     patch_of: Vec<u32>,
     /// Depth of subdivision of each patch.
-    depth: Vec<u8>,
+    pub depth: Vec<u8>,
 }
 
 /// The form in a checkpoint.
@@ -62,10 +62,6 @@ impl Patches {
         self.depth.len()
     }
 
-    pub fn layout(&self) -> &TexelLayout {
-        &self.layout
-    }
-
     /// The patch of a texel of the grid.
     #[inline]
     pub fn of_texel(&self, texel: u32) -> usize {
@@ -82,11 +78,6 @@ impl Patches {
     pub fn spread<T: Copy>(&self, values: &[T]) -> Vec<T> {
         let value = |&patch: &u32| values[patch as usize];
         self.patch_of.iter().map(value).collect()
-    }
-
-    /// Depth of subdivision of each patch.
-    pub fn depth(&self) -> &[u8] {
-        &self.depth
     }
 
     /// Whether the sizes fit this number of triangles.

@@ -10,7 +10,7 @@ use crate::inverse::settings::{Loss, Settings};
 use crate::inverse::unknowns::Unknowns;
 use crate::math::rng::Stream;
 use crate::transport::arrival::RayCount;
-use glam::{Vec2, Vec3, Vec3A};
+use glam::{Vec3, Vec3A};
 
 /// Attempts to draw a usable pixel.
 const TRIES: u32 = 64;
@@ -145,13 +145,10 @@ impl Rendering<'_> {
 
     /// Traces a path and replaces its surfaces by local indices.
     fn trace(&self, drawn: Drawn, stream: &mut Stream, path: &mut Path, cast: &mut RayCount) {
-        let width = self.problem.photographs[drawn.frame as usize].width;
-        let corner = Vec2::new((drawn.pixel % width) as f32, (drawn.pixel / width) as f32);
         let camera = &self.problem.scene.cameras[drawn.frame as usize];
+        let corner = camera.corner(drawn.pixel as usize);
         path.vertices.clear();
-        let (rays, accepted) = (self.tracer).pixel_path(camera, corner, stream, &mut path.vertices);
-        cast.rays += rays;
-        cast.rejected += u64::from(!accepted);
+        *cast += (self.tracer).pixel_path(camera, corner, stream, &mut path.vertices);
         path.global.clear();
         path.unknowns.albedo.clear();
         path.unknowns.emission.clear();

@@ -10,7 +10,6 @@ const MIN_DECREASE: f64 = 0.01;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Schedule {
     losses: Vec<f64>,
-    /// Number of paths until the next measurement.
     until_measured: u64,
 }
 
@@ -55,16 +54,5 @@ mod tests {
         assert!(level.measured(Some(1.0), 1, 4));
         level.start_over();
         assert!(!level.measured(Some(1.0), 1, 4));
-    }
-
-    #[test]
-    fn a_measurement_is_due_at_first_and_after_enough_paths() {
-        let mut schedule = Schedule::default();
-        assert!(schedule.due());
-        schedule.measured(None, 1000, 4);
-        schedule.traced(999);
-        assert!(!schedule.due());
-        schedule.traced(16);
-        assert!(schedule.due());
     }
 }

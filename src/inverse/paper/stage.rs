@@ -2,7 +2,7 @@
 
 use crate::inverse::paper::descent::Descent;
 use crate::inverse::paper::pace::Pace;
-use crate::inverse::paper::patches::MAX_DEPTH;
+use crate::inverse::paper::patches::{MAX_DEPTH, Patches};
 use crate::inverse::paper::schedule::Schedule;
 use crate::inverse::paper::{Run, State};
 use crate::inverse::solver::{Stage, Termination};
@@ -32,9 +32,7 @@ const FRUITLESS: u32 = 2;
 pub struct Best {
     albedo: Vec<Vec3>,
     emission: Vec<Vec3>,
-    /// Loss on pixels in the fit.
     train: Option<f64>,
-    /// Loss on held-out pixels.
     held_out: Option<f64>,
     /// [`Best::judged`] at the start of the stage.
     at_first: Option<f64>,
@@ -129,7 +127,6 @@ impl Run<'_, '_> {
         }
     }
 
-    /// Number of paths until the next measurement.
     fn until_measured(&self) -> u64 {
         let seen = self.covered.iter().filter(|&&pixels| pixels > 0).count() as u64;
         let pace = Pace::new(&self.state.descent, &self.monitor.settings);
@@ -158,8 +155,7 @@ impl Run<'_, '_> {
         loss.train
     }
 
-    /// Sets the best state of the stage and records the stage. It replaces the record of an earlier, interrupted part of the same
-    /// stage.
+    /// Sets the best state of the stage and records it, in place of the record of an earlier, interrupted part of the same stage.
     fn finish_stage(&mut self) {
         self.measure();
         let Some(best) = self.state.best.take() else {
@@ -176,25 +172,20 @@ impl Run<'_, '_> {
                 None => "pixels in the fit",
             }
         );
-        let (name, what) = match (&self.state.descent.patches, self.state.cuts) {
-            (None, _) => (
-                "objects".to_owned(),
-                "one albedo and one emission an object".to_owned(),
-            ),
-            (Some(patches), 0) => (
-                "triangles".to_owned(),
-                format!(
-                    "{} triangles or parts of large ones, lamps stay in place",
-                    patches.len()
-                ),
-            ),
-            (Some(patches), cuts) => (
-                format!("cut {cuts}"),
-                format!(
-                    "{} parts of triangles, cut where pixels are worst",
-                    patches.len()
-                ),
-            ),
+        let patches = self.state.descent.patches.as_ref().map(Patches::len);
+        let (name, what) = match (patches, self.state.cuts) {
+            (None, _) => {
+                let what = "one albedo and one emission an object".to_owned();
+                ("objects".to_owned(), what)
+            }
+            (Some(n), 0) => {
+                let what = "triangles or parts of large ones, lamps stay in place";
+                ("triangles".to_owned(), format!("{n} {what}"))
+            }
+            (Some(n), cuts) => {
+                let what = "parts of triangles, cut where pixels are worst";
+                (format!("cut {cuts}"), format!("{n} {what}"))
+            }
         };
         let (started, iterations) = self.state.stage_started;
         let seconds = self.monitor.seconds() - started;
@@ -218,9 +209,9 @@ impl Run<'_, '_> {
     /// Starts the next stage: an albedo for each triangle, then the worst patches cut into four. `false` if there is none.
     fn refine(&mut self) -> bool {
         let scene = &self.problem.scene;
-        let which = match self.state.descent.patches {
+        let (which, cuts) = match self.state.descent.patches {
             None if scene.triangles.len() <= scene.objects.len() => return false,
-            None => Vec::new(),
+            None => (Vec::new(), 0),
             Some(_) => {
                 let (settings, descent) = (&self.monitor.settings, &mut self.state.descent);
                 let (worst, cast) =
@@ -229,12 +220,8 @@ impl Run<'_, '_> {
                 if !worst.contains(&true) {
                     return false;
                 }
-                worst
+                (worst, self.state.cuts + 1)
             }
-        };
-        let cuts = match self.state.descent.patches {
-            None => 0,
-            Some(_) => self.state.cuts + 1,
         };
         self.state = State {
             descent: self.state.descent.refined(&self.problem.scene, &which),
@@ -256,7 +243,7 @@ impl Run<'_, '_> {
             let Some(patches) = &self.state.descent.patches else {
                 return;
             };
-            let covered = self.covered.iter().zip(patches.depth());
+            let covered = self.covered.iter().zip(&patches.depth);
             let which: Vec<bool> = covered
                 .map(|(&pixels, &depth)| pixels > MAX_COVERED && depth < MAX_DEPTH)
                 .collect();

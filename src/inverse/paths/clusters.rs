@@ -9,7 +9,6 @@ use crate::math::stats::upper_median;
 use glam::{BVec3, DVec3, Vec3};
 use std::collections::BTreeMap;
 
-/// Target number of pixels in a cluster.
 const CLUSTER_PIXELS: f64 = 48.0;
 /// Objects with fewer pixels than this away from their edges are fitted at their edges too.
 const ENOUGH: u64 = 48;
@@ -160,8 +159,7 @@ fn allowed_edges(
     counts.into_iter().map(allowed).collect()
 }
 
-/// Side of the tiles, in pixels, of an object that is fitted at its edges. Pixels at edges differ in coverage and in accuracy, so
-/// few of them share a cluster and its weight.
+/// Side of the tiles, in pixels, of an object fitted at its edges: pixels there differ, so that few share a cluster and its weight.
 fn tile_at_edges(pixels: u64) -> u32 {
     (pixels as f64 / SMALL as f64).sqrt().floor().max(1.0) as u32
 }

@@ -4,8 +4,7 @@ use crate::inverse::paths::{NO_LAMP, NO_PATCH, SPECULAR, Vertex};
 use crate::inverse::unknowns::Unknowns;
 use glam::{Vec3, Vec3A};
 
-/// Derivatives of a radiance: dense over the parameters (albedos of all surfaces, then emissions), with a list of the non-zero
-/// ones.
+/// Derivatives of a radiance, dense over albedos of all surfaces, then emissions, with a list of the non-zero ones.
 pub struct Gradient {
     /// Derivative with respect to each parameter.
     pub values: Vec<Vec3A>,

@@ -19,8 +19,7 @@ pub struct Linearised {
     pub residuals: [DVec3; 2],
     /// Channels in which the photograph is saturated: a brighter model has no residual there.
     pub censored: BVec3,
-    /// Derivative with respect to the object's emission if it is a pure emitter, else with respect to its albedo; mean of
-    /// both sets.
+    /// Derivative with respect to the emission of a pure emitter, or else the object's albedo; mean of both sets.
     pub own: DVec3,
     /// Index of a free parameter, derivative from set A, derivative from set B.
     pub rows: Vec<(usize, DVec3, DVec3)>,

@@ -1,8 +1,7 @@
 //! Reflected radiance of lamps per triangle ("patch"), for an albedo of one.
 //!
-//! A lamp's albedo adds little to its radiance, by an amount that varies over the lamp. Following paths beyond lamps would
-//! estimate it with too much noise. It is instead traced once from each patch and looked up wherever a light sample or a path
-//! reaches one.
+//! A lamp's albedo adds little to its radiance, by an amount that varies over the lamp. Following paths beyond lamps would estimate
+//! it with too much noise. It is instead traced once from each patch and looked up wherever a light sample or a path reaches one.
 
 use crate::inverse::paths::NO_PATCH;
 use crate::inverse::roles::Role;
@@ -18,7 +17,6 @@ use rayon::prelude::*;
 
 /// Least and greatest number of paths per patch; the least one if the total allows it.
 const PATHS: [f64; 2] = [4.0, 1024.0];
-/// Key of the random streams.
 const KEY: u64 = 0x7061_7463;
 
 /// The triangles of all lamps.

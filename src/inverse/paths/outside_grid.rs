@@ -46,8 +46,7 @@ impl OutsideGrid {
         self.first + (self.width * self.height) as u32
     }
 
-    /// The surface of the sun. Its emission is the irradiance at normal incidence over π: the radiance of a uniform sky that
-    /// gives as much light.
+    /// The surface of the sun. Its emission is the irradiance at normal incidence over π: that of a uniform sky of as much light.
     pub fn sun_surface(&self) -> u32 {
         self.map_end() + 2
     }

@@ -2,7 +2,6 @@
 
 use crate::calibrate::gbuffer::SurfacePoint;
 use crate::calibrate::measured_radiance::MeasuredRadiance;
-use crate::inverse::estimate::TexelEstimate;
 use crate::inverse::outside::MeasuredOutside;
 use crate::inverse::paths::clusters::Cluster;
 use crate::inverse::paths::lamp_patches::LampPatches;
@@ -16,6 +15,7 @@ use crate::math::warp;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::scene::geometry::{Hit, Ray, offset_origin};
+use crate::scene::texels::TexelLayout;
 use crate::transport::arrival::RayCount;
 use crate::transport::emitters::Emitters;
 use crate::transport::material::Lobe;
@@ -26,7 +26,6 @@ use std::f32::consts::{FRAC_1_PI, PI};
 
 /// Bounces before Russian roulette may end a path.
 const RR_DEPTH: u32 = 2;
-/// Least survival probability of Russian roulette.
 const RR_MIN_SURVIVAL: f32 = 0.1;
 /// Greatest survival probability of Russian roulette. The variance is finite while the squared albedo is below it.
 const RR_MAX_SURVIVAL: f32 = 0.999;
@@ -50,8 +49,8 @@ pub struct Tracer<'a> {
     pub surface_of: &'a [u32],
     /// For each surface, the largest channel of its present albedo estimate; used for sampling decisions only.
     pub expected_albedo: &'a [f32],
-    /// Textures whose texel indices are stored at the vertices.
-    pub texels: Option<&'a TexelEstimate>,
+    /// Textures whose texel indices are stored at the vertices, and whether each object has one; `None` if all have.
+    pub texels: Option<(&'a TexelLayout, Option<&'a [bool]>)>,
     /// The rough specular lobe of each object that has one; empty without lobes. Objects with a lobe emit no light.
     pub lobes: &'a [Option<Lobe>],
     /// Patches of lamps with known reflected light. Paths end at them except at the first vertex; `None` continues all paths.
@@ -73,23 +72,24 @@ pub struct Tracer<'a> {
 }
 
 impl Tracer<'_> {
-    /// Traces two independent sets of paths for every cluster. `widths` are the image widths of the frames.
-    pub fn trace(&self, clusters: &[Cluster], widths: &[u32]) -> PathCache {
+    /// Traces two independent sets of paths for every cluster.
+    pub fn trace(&self, clusters: &[Cluster]) -> PathCache {
         let (clusters, casts): (Vec<CachedCluster>, Vec<RayCount>) = clusters
             .par_iter()
-            .map(|cluster| self.cluster(cluster, widths[cluster.frame as usize]))
+            .map(|cluster| self.cluster(cluster))
             .unzip();
         let cast = casts.into_iter().sum();
         PathCache { clusters, cast }
     }
 
-    fn cluster(&self, cluster: &Cluster, width: u32) -> (CachedCluster, RayCount) {
+    fn cluster(&self, cluster: &Cluster) -> (CachedCluster, RayCount) {
+        let camera = &self.scene.cameras[cluster.frame as usize];
         let (mut vertices, mut ends) = (Vec::new(), Vec::new());
         let mut cast = RayCount::default();
         let (paths, count) = (u64::from(cluster.paths), cluster.pixels.len() as u64);
         let first = cluster.pixels.first().copied().map_or(0, u64::from);
         for (position, &pixel) in cluster.pixels.iter().enumerate() {
-            let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
+            let corner = camera.corner(pixel as usize);
             for path in 0..2 * paths {
                 // All paths of a set, over its pixels and rounds, share one low-discrepancy sequence.
                 let set = path / paths;
@@ -97,10 +97,7 @@ impl Tracer<'_> {
                     (u64::from(self.round) * count + position as u64) * paths + path % paths;
                 let key = [u64::from(cluster.frame), first, 2 * self.stage + set];
                 let mut numbers = SequencePoint::new(self.seed, key, index);
-                let camera = &self.scene.cameras[cluster.frame as usize];
-                let (rays, accepted) = self.pixel_path(camera, corner, &mut numbers, &mut vertices);
-                cast.rays += rays;
-                cast.rejected += u64::from(!accepted);
+                cast += self.pixel_path(camera, corner, &mut numbers, &mut vertices);
                 ends.push(vertices.len() as u32);
             }
         }
@@ -116,15 +113,14 @@ impl Tracer<'_> {
         )
     }
 
-    /// Appends the vertices of one path through the pixel whose upper left corner is given. Returns the number of rays, and
-    /// whether all weights are finite; otherwise nothing is appended.
+    /// Appends the vertices of one path through the pixel at `corner`, unless a weight is not finite: then it counts as rejected.
     pub fn pixel_path(
         &self,
         camera: &Camera,
         corner: Vec2,
         numbers: &mut impl Uniforms,
         vertices: &mut Vec<Vertex>,
-    ) -> (u64, bool) {
+    ) -> RayCount {
         let start = vertices.len();
         let [dx, dy, ..] = numbers.four();
         let rays = self.path(&camera.ray(corner + Vec2::new(dx, dy)), numbers, vertices);
@@ -134,7 +130,10 @@ impl Tracer<'_> {
         if !finite {
             vertices.truncate(start);
         }
-        (rays, finite)
+        RayCount {
+            rays,
+            rejected: u64::from(!finite),
+        }
     }
 
     /// Appends the vertices of one path; returns the number of rays.
@@ -368,8 +367,7 @@ impl Tracer<'_> {
         self.fraction(self.outside.is_some_and(|grid| grid.sun.is_some()))
     }
 
-    /// Light samples are divided evenly among emitters of the mesh, the measured outside light and the sun, as far as there are
-    /// any.
+    /// Light samples are divided evenly among emitters of the mesh, measured outside light and the sun, as far as they exist.
     fn fraction(&self, exists: bool) -> f32 {
         let sun = self.outside.is_some_and(|grid| grid.sun.is_some());
         let all = [!self.lights.is_dark(), self.sky.is_some(), sun];
@@ -403,10 +401,11 @@ impl Tracer<'_> {
 
     fn texel(&self, hit: &Hit) -> u32 {
         let object = self.scene.object_of[hit.triangle as usize] as usize;
+        let has_one = |textured: &[bool]| textured.get(object) == Some(&true);
         let textures = self
             .texels
-            .filter(|t| t.textured.get(object) == Some(&true));
-        textures.map_or(NO_TEXEL, |t| t.colors.layout.texel(hit))
+            .filter(|(_, textured)| textured.is_none_or(has_one));
+        textures.map_or(NO_TEXEL, |(layout, _)| layout.texel(hit))
     }
 
     fn patch(&self, triangle: u32) -> u32 {
@@ -435,9 +434,7 @@ struct Surface {
     /// With the normal of the side that the path arrives at.
     point: SurfacePoint,
     corners: [Vec3; 3],
-    /// Index of its unknowns.
     id: u32,
-    /// Whether the path arrives at the front.
     front: bool,
     /// What the path chose of a surface with a lobe.
     scattering: Option<Scattering>,
@@ -451,8 +448,7 @@ impl Surface {
         offset_origin(self.point.point, self.point.normal, &self.corners, wi)
     }
 
-    /// For a unit direction above the horizon: f cosθ / albedo, and the pdf of sampling it. Both are cosθ/π, or those of the
-    /// chosen component of a surface with a lobe.
+    /// For a unit direction above the horizon: f cosθ / albedo and the pdf of sampling it, cosθ/π or those of the lobe's component.
     fn value(&self, wi: Vec3) -> (f32, f32) {
         match &self.scattering {
             Some(scattering) => scattering.value(wi),

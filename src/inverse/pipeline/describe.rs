@@ -1,17 +1,12 @@
 //! Converts the fitted unknowns to an estimate, with remarks on what is not determined.
 
-use crate::calibrate::gbuffer::GBuffer;
 use crate::inverse::estimate::{Estimate, ObjectEstimate, Outside};
-use crate::inverse::fit::errors::StandardErrors;
 use crate::inverse::fit::prior::ALBEDO_DEVIATION;
 use crate::inverse::outside::MeasuredOutside;
-use crate::inverse::paths::outside_grid::OutsideGrid;
+use crate::inverse::pipeline::Pipeline;
 use crate::inverse::roles::Role;
-use crate::inverse::unknowns::Unknowns;
 use crate::math::color::luminance;
-use crate::scene::Scene;
 use crate::transport::environment::{direction_of, pixel_of, row_solid_angle};
-use crate::transport::material::Lobe;
 use crate::transport::sun::Sun;
 use crate::transport::surroundings::Surroundings;
 use glam::{DVec3, Vec3};
@@ -30,138 +25,141 @@ const SUN_MAP: [usize; 2] = [256, 128];
 /// Relative difference in radiance, and difference of an albedo from one, below which a wall may be confused with a lamp.
 const WHITE: f32 = 0.01;
 
-/// The estimate for the given unknowns, standard errors and lobes.
-#[expect(clippy::too_many_arguments, reason = "the whole result of a solve")]
-pub fn estimate(
-    scene: &Scene,
-    gbuffer: &GBuffer,
-    roles: &[Role],
-    unknowns: &Unknowns,
-    errors: &StandardErrors,
-    outside: OutsideGrid,
-    sky: Option<&MeasuredOutside>,
-    lobes: &[Option<Lobe>],
-) -> Estimate {
-    let typical = typical_albedo(scene, roles, unknowns, errors);
-    // Without any source, photographs are also explained by albedos of one in arbitrary light.
-    let sourceless = sky.is_none() && unknowns.emission.iter().all(|&e| e == Vec3::ZERO);
-    let objects = (0..scene.objects.len())
-        .map(|k| {
-            let seen = gbuffer.seen[k];
-            let mut object = ObjectEstimate {
-                albedo: unknowns.albedo[k],
-                albedo_stderr: errors.albedo[k],
-                emission: unknowns.emission[k],
-                // File formats have no infinity.
-                emission_stderr: errors.emission[k].min(Vec3::splat(f32::MAX)),
-                seen_pixels: seen,
-                roughness: lobes[k].map(|lobe| lobe.roughness),
-                specular: lobes[k].map(|lobe| lobe.specular.x),
-                ..Default::default()
-            };
-            match roles[k] {
-                Role::Reflector | Role::Glowing => {
-                    let unknown = errors.albedo[k].max_element() > UNKNOWN_ALBEDO;
-                    if unknown {
-                        object.albedo = shrunk(unknowns.albedo[k], errors.albedo[k], typical);
-                    }
-                    if unknown || sourceless {
-                        object.albedo_identifiable = false;
-                        object.identifiable = false;
-                        object.note = if unknown {
-                            "too few paths through its pixels meet light to tell its albedo".into()
-                        } else {
-                            "no source was found of the light that it reflects".into()
-                        };
-                    }
-                }
-                Role::Emitter => {
-                    object.albedo = Vec3::ZERO;
-                    object.albedo_stderr = Vec3::splat(ALBEDO_DEVIATION);
-                    object.albedo_identifiable = false;
-                    object.note =
-                        "its own light hides what it reflects; emission is all that leaves it"
-                            .into();
-                    if is_unknown(object.emission, object.emission_stderr) {
-                        object.identifiable = false;
-                        object.note = "the photographs hardly tell how much light it gives".into();
-                    } else if seen < FEW_PIXELS {
-                        object.note.push_str("; only a few pixels see it");
-                    }
-                }
-                Role::Unseen | Role::Dark => {
-                    object.albedo_stderr = Vec3::splat(ALBEDO_DEVIATION);
-                    object.identifiable = false;
-                    object.albedo_identifiable = false;
-                    object.note = match roles[k] {
-                        Role::Dark => "no photograph sees it; its albedo is assumed",
-                        _ => "no photograph sees it; its emission is inferred from its effect on others",
-                    }
-                    .into();
+const LAMP: &str = "its own light hides what it reflects; emission is all that leaves it";
+const LAMP_OF_FEW_PIXELS: &str = "its own light hides what it reflects; emission is all that leaves it; only a few pixels see it";
+const UNSEEN: &str = "no photograph sees it; its emission is inferred from its effect on others";
+
+impl Pipeline<'_, '_> {
+    /// The estimate by unknowns, standard errors and lobes alone.
+    pub(super) fn fitted_estimate(&self) -> Estimate {
+        let typical = self.typical_albedo();
+        // Without any source, photographs are also explained by albedos of one in arbitrary light.
+        let dark = self.unknowns.emission.iter().all(|&e| e == Vec3::ZERO);
+        let sourceless = self.sky.is_none() && dark;
+        let objects = 0..self.problem.scene.objects.len();
+        Estimate {
+            objects: objects
+                .map(|k| self.object_estimate(k, typical, sourceless))
+                .collect(),
+            outside: self.outside_light(),
+            ..Default::default()
+        }
+    }
+
+    /// The estimate of one object, given the room's typical albedo and whether no source of light was found.
+    fn object_estimate(&self, k: usize, typical: Vec3, sourceless: bool) -> ObjectEstimate {
+        let (albedo, albedo_stderr) = (self.unknowns.albedo[k], self.errors.albedo[k]);
+        let mut object = ObjectEstimate {
+            albedo,
+            albedo_stderr,
+            emission: self.unknowns.emission[k],
+            // File formats have no infinity.
+            emission_stderr: self.errors.emission[k].min(Vec3::splat(f32::MAX)),
+            seen_pixels: self.gbuffer.seen[k],
+            roughness: self.lobes[k].map(|lobe| lobe.roughness),
+            specular: self.lobes[k].map(|lobe| lobe.specular.x),
+            ..Default::default()
+        };
+        if !self.roles[k].reflects() {
+            object.albedo_stderr = Vec3::splat(ALBEDO_DEVIATION);
+        }
+        let (identifiable, note) = match self.roles[k] {
+            Role::Reflector | Role::Glowing if albedo_stderr.max_element() > UNKNOWN_ALBEDO => {
+                object.albedo = shrunk(albedo, albedo_stderr, typical);
+                let note = "too few paths through its pixels meet light to tell its albedo";
+                (false, note)
+            }
+            Role::Reflector | Role::Glowing if sourceless => {
+                (false, "no source was found of the light that it reflects")
+            }
+            Role::Reflector | Role::Glowing => return object,
+            Role::Emitter => {
+                object.albedo = Vec3::ZERO;
+                if is_unknown(object.emission, object.emission_stderr) {
+                    (false, "the photographs hardly tell how much light it gives")
+                } else if object.seen_pixels < FEW_PIXELS {
+                    (true, LAMP_OF_FEW_PIXELS)
+                } else {
+                    (true, LAMP)
                 }
             }
-            object
-        })
-        .collect();
-    let outside = outside_light(unknowns, outside, sky);
-    Estimate {
-        objects,
-        outside,
-        ..Default::default()
+            Role::Unseen => (false, UNSEEN),
+            Role::Dark => (false, "no photograph sees it; its albedo is assumed"),
+        };
+        object.identifiable = identifiable;
+        object.albedo_identifiable = false;
+        object.note = note.to_owned();
+        object
     }
-}
 
-/// The light from outside as a map; `None` if it is black.
-fn outside_light(
-    unknowns: &Unknowns,
-    grid: OutsideGrid,
-    sky: Option<&MeasuredOutside>,
-) -> Option<Outside> {
-    let emission = |surface: u32| unknowns.emission[surface as usize];
-    let elsewhere = |direction| emission(grid.surface(direction));
-    let [width, height] = match (sky, grid.sun) {
-        (Some(sky), _) => sky.size(),
-        (None, Some(_)) => SUN_MAP,
-        (None, None) => [grid.width, grid.height],
-    };
-    // On a box, light of one point is not that of one direction: a window sends the sky's light down and the ground's up.
-    let boxed = grid.surroundings != Surroundings::Far;
-    let filled = |towards: Option<Vec3>| -> Vec<Vec3> {
-        match sky {
-            Some(sky) => sky.filled(towards, |from| emission(grid.excess(from)), elsewhere),
-            None => (0..width * height)
-                .map(|pixel| elsewhere(direction_of(width, height, pixel)))
-                .collect(),
+    /// The light from outside as a map; `None` if it is black.
+    fn outside_light(&self) -> Option<Outside> {
+        let (unknowns, grid, sky) = (&self.unknowns, self.outside, self.sky.as_ref());
+        let emission = |surface: u32| unknowns.emission[surface as usize];
+        let elsewhere = |direction| emission(grid.surface(direction));
+        let [width, height] = match (sky, grid.sun) {
+            (Some(sky), _) => sky.map().size(),
+            (None, Some(_)) => SUN_MAP,
+            (None, None) => [grid.width, grid.height],
+        };
+        // On a box, light of one point is not that of one direction: a window sends the sky's light down and the ground's up.
+        let boxed = grid.surroundings != Surroundings::Far;
+        let filled = |towards: Option<Vec3>| -> Vec<Vec3> {
+            match sky {
+                Some(sky) => sky.filled(towards, |from| emission(grid.excess(from)), elsewhere),
+                None => (0..width * height)
+                    .map(|pixel| elsewhere(direction_of(width, height, pixel)))
+                    .collect(),
+            }
+        };
+        let mut pixels = filled(boxed.then_some(-grid.up));
+        let above = (boxed && sky.is_some()).then(|| filled(Some(grid.up)));
+        let sun = grid.sun.map(|direction| Sun {
+            direction,
+            irradiance: emission(grid.sun_surface()) * PI,
+        });
+        let sun = sun.filter(|sun| sun.irradiance != Vec3::ZERO);
+        if let Some(Sun {
+            direction,
+            irradiance,
+        }) = sun.filter(|_| !boxed)
+        {
+            let pixel = pixel_of(width, height, direction);
+            let solid_angle = row_solid_angle(pixel / width, width, height) as f32;
+            pixels[pixel] += irradiance / solid_angle;
         }
-    };
-    let mut pixels = filled(boxed.then_some(-grid.up));
-    let above = (boxed && sky.is_some()).then(|| filled(Some(grid.up)));
-    let sun = grid.sun.map(|direction| Sun {
-        direction,
-        irradiance: emission(grid.sun_surface()) * PI,
-    });
-    let sun = sun.filter(|sun| sun.irradiance != Vec3::ZERO);
-    if let Some(Sun {
-        direction,
-        irradiance,
-    }) = sun.filter(|_| !boxed)
-    {
-        let pixel = pixel_of(width, height, direction);
-        let solid_angle = row_solid_angle(pixel / width, width, height) as f32;
-        pixels[pixel] += irradiance / solid_angle;
+        let shines = |pixels: &[Vec3]| pixels.iter().any(|&p| p != Vec3::ZERO);
+        let beyond = sun.filter(|_| boxed);
+        let any = shines(&pixels) || above.as_deref().is_some_and(shines) || beyond.is_some();
+        any.then_some(Outside {
+            width: width as u32,
+            height: height as u32,
+            pixels,
+            above,
+            surroundings: grid.surroundings,
+            sun: beyond,
+            openings: beyond.and(sky).map(MeasuredOutside::openings),
+        })
     }
-    let shines = |pixels: &[Vec3]| pixels.iter().any(|&p| p != Vec3::ZERO);
-    let beyond = sun.filter(|_| boxed);
-    let any = shines(&pixels) || above.as_deref().is_some_and(shines) || beyond.is_some();
-    any.then_some(Outside {
-        width: width as u32,
-        height: height as u32,
-        pixels,
-        above,
-        surroundings: grid.surroundings,
-        sun: beyond,
-        openings: beyond.and(sky).map(MeasuredOutside::openings),
-    })
+
+    /// Area-weighted mean of the determined albedos; 0.5 if there are none.
+    fn typical_albedo(&self) -> Vec3 {
+        let mut sum = DVec3::ZERO;
+        let mut area = 0.0;
+        for (k, object) in self.problem.scene.objects.iter().enumerate() {
+            let known = self.roles[k] == Role::Reflector
+                && self.errors.albedo[k].max_element() <= UNKNOWN_ALBEDO;
+            if known && luminance(self.unknowns.albedo[k]).is_finite() {
+                sum += self.unknowns.albedo[k].as_dvec3() * object.area;
+                area += object.area;
+            }
+        }
+        if area > 0.0 {
+            (sum / area).as_vec3()
+        } else {
+            Vec3::splat(0.5)
+        }
+    }
 }
 
 /// Marks white walls and lamps of equal radiance as not identifiable. Between white surfaces all radiance approaches that of the
@@ -197,35 +195,11 @@ fn is_unknown(emission: Vec3, stderr: Vec3) -> bool {
     stderr.max_element() > UNKNOWN_EMISSION * emission.max_element()
 }
 
-/// An uncertain albedo shrunk to the room's typical one: the mean of both, weighted by the inverse variances of the fit and of the
-/// prior.
+/// An uncertain albedo shrunk to the room's typical one: the mean of both by the inverse variances of fit and prior.
 fn shrunk(albedo: Vec3, stderr: Vec3, typical: Vec3) -> Vec3 {
     let variance = stderr * stderr / (ALBEDO_DEVIATION * ALBEDO_DEVIATION);
     let fraction = (variance + Vec3::ONE).recip();
     albedo * fraction + typical * (Vec3::ONE - fraction)
-}
-
-/// Area-weighted mean of the determined albedos; 0.5 if there are none.
-fn typical_albedo(
-    scene: &Scene,
-    roles: &[Role],
-    unknowns: &Unknowns,
-    errors: &StandardErrors,
-) -> Vec3 {
-    let mut sum = DVec3::ZERO;
-    let mut area = 0.0;
-    for (k, object) in scene.objects.iter().enumerate() {
-        let known = roles[k] == Role::Reflector && errors.albedo[k].max_element() <= UNKNOWN_ALBEDO;
-        if known && luminance(unknowns.albedo[k]).is_finite() {
-            sum += unknowns.albedo[k].as_dvec3() * object.area;
-            area += object.area;
-        }
-    }
-    if area > 0.0 {
-        (sum / area).as_vec3()
-    } else {
-        Vec3::splat(0.5)
-    }
 }
 
 #[cfg(test)]
@@ -239,14 +213,6 @@ mod tests {
         assert!(at(UNKNOWN_ALBEDO) < 0.02);
         assert!((at(ALBEDO_DEVIATION) - 0.2).abs() < 1e-6);
         assert!((at(f32::INFINITY) - 0.4).abs() < 1e-6);
-    }
-
-    #[test]
-    fn an_emission_is_known_where_its_error_is_small_beside_its_brightest_channel() {
-        let red = Vec3::new(2.0, 0.1, 0.0);
-        assert!(!is_unknown(red, Vec3::splat(0.3)));
-        assert!(is_unknown(red, Vec3::new(1.1, 0.0, 0.0)));
-        assert!(is_unknown(red, Vec3::INFINITY));
     }
 
     #[test]

@@ -4,10 +4,9 @@ use crate::inverse::emitters::classify::classify;
 use crate::inverse::fit::errors::{ScoreTest, score_tests};
 use crate::inverse::fit::gauss_newton::Fit;
 use crate::inverse::paths::PathCache;
-use crate::inverse::pipeline::Pipeline;
-use crate::inverse::pipeline::known::role_under;
+use crate::inverse::pipeline::fitting::role_under;
+use crate::inverse::pipeline::{Pipeline, Result};
 use crate::inverse::roles::Role;
-use crate::inverse::solver::Termination;
 use crate::transport::emitters::{Emitters, powers};
 use glam::Vec3;
 
@@ -50,7 +49,7 @@ impl Pipeline<'_, '_> {
     }
 
     /// Removes insignificant emission of unseen objects, the least significant half at a time, with a refit after each.
-    fn prune_unseen(&mut self, cache: &PathCache) -> Result<(), Termination> {
+    fn prune_unseen(&mut self, cache: &PathCache) -> Result {
         loop {
             let mut doubtful: Vec<(f64, usize)> = (0..self.problem.scene.objects.len())
                 .filter(|&k| self.roles[k] == Role::Unseen && !self.emission_is_known(k))
@@ -73,11 +72,7 @@ impl Pipeline<'_, '_> {
 
     /// Starting from a fit with the present roles, changes the roles of objects and refits until the classification is stable; then
     /// removes insignificant emission of unseen objects.
-    pub(super) fn settle_roles(
-        &mut self,
-        cache: &PathCache,
-        mut fitted: Fit,
-    ) -> Result<(), Termination> {
+    pub(super) fn settle_roles(&mut self, cache: &PathCache, mut fitted: Fit) -> Result {
         self.take_values(&fitted);
         let mut was_emitter = vec![false; self.roles.len()];
         for _ in 0..MAX_CHANGES {
@@ -115,7 +110,7 @@ impl Pipeline<'_, '_> {
     /// it stays significant. Returns the names of the added lamps.
     ///
     /// The first rejection ends the search: less significant candidates are due to textures or highlights.
-    pub(super) fn test_glow(&mut self, cache: &PathCache) -> Result<Vec<String>, Termination> {
+    pub(super) fn test_glow(&mut self, cache: &PathCache) -> Result<Vec<String>> {
         let objects = self.roles.len();
         let in_mesh = self.problem.scene.objects.len();
         let mut added = Vec::new();
@@ -132,11 +127,7 @@ impl Pipeline<'_, '_> {
                 break;
             };
             let k = candidate.index - objects;
-            let before = (
-                self.unknowns.clone(),
-                self.errors.clone(),
-                self.roles.clone(),
-            );
+            let before = self.found();
             self.roles[k] = if self.roles[k] == Role::Dark {
                 Role::Unseen
             } else {
@@ -146,7 +137,7 @@ impl Pipeline<'_, '_> {
             self.take(&fitted);
             let faint = self.unknowns.emission[k].max_element() < FAINT * self.brightness[k];
             if self.significance(k) < SIGNIFICANT || faint {
-                (self.unknowns, self.errors, self.roles) = before;
+                self.go_back_to(before);
                 break;
             }
             added.push(self.problem.scene.objects[k].name.clone());

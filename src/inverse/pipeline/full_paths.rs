@@ -2,16 +2,14 @@
 
 use crate::inverse::fit::robust_weights::RobustWeights;
 use crate::inverse::paths::PathCache;
-use crate::inverse::pipeline::Pipeline;
-use crate::inverse::solver::Termination;
+use crate::inverse::pipeline::{Pipeline, Result};
 
-/// Greatest number of searches for unseen lamps.
 const MAX_SEARCHES: usize = 3;
 
 impl Pipeline<'_, '_> {
     /// Second stage: full paths to the lamps. Lamps that the light field missed or imagined are found here, since full paths
     /// depend on the model alone.
-    pub(super) fn full_paths(&mut self) -> Result<(), Termination> {
+    pub(super) fn full_paths(&mut self) -> Result {
         let started = self.monitor.seconds();
         self.search_anew()?;
         let (mut cache, mut limit) = self.fit_full_paths()?;
@@ -36,7 +34,7 @@ impl Pipeline<'_, '_> {
 
     /// Stores full paths to the present lamps, fits all that is free to them, and settles the roles. Also returns the remark of
     /// [`Self::stored`] on their number.
-    fn fit_full_paths(&mut self) -> Result<(PathCache, String), Termination> {
+    fn fit_full_paths(&mut self) -> Result<(PathCache, String)> {
         self.monitor.phase("tracing paths to the lamps");
         let lights = self.lights();
         let (cache, limit) = self.stored(&lights, None, 1, self.budget.round_paths)?;

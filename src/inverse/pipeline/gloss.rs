@@ -1,10 +1,9 @@
 //! The stage of rough specular lobes: screening, trials, and refits.
 
 use crate::inverse::known::Pinned;
-use crate::inverse::lobe::{Gain, LobeFit, Lobes, Task};
-use crate::inverse::pipeline::Pipeline;
+use crate::inverse::lobe::{Gain, LobeFit, Lobes};
+use crate::inverse::pipeline::{Pipeline, Result};
 use crate::inverse::roles::Role;
-use crate::inverse::solver::Termination;
 use crate::transport::arrival::RayCount;
 use glam::Vec3;
 
@@ -15,14 +14,14 @@ const MAX_FULL_TRIALS: u64 = 4;
 
 impl<'a> Pipeline<'a, '_> {
     /// Tries a lobe on each promising object. If any is kept, glowing objects become reflectors and full paths are fitted again.
-    pub(super) fn gloss(&mut self) -> Result<(), Termination> {
+    pub(super) fn gloss(&mut self) -> Result {
         let started = self.monitor.seconds();
         self.monitor.phase("looking for gloss");
         let objects: Vec<usize> = (0..self.problem.scene.objects.len())
             .filter(|&k| self.roles[k].reflects() || self.roles[k] == Role::Emitter)
             .filter(|&k| self.monitor.known.object(k) == Pinned::default())
             .collect();
-        let mut lobes = Lobes::new(self.lobe_task(1), &self.gbuffer);
+        let mut lobes = self.lobes_of(1);
         let estimate = self.estimate.clone();
         let evidence = lobes.evidence(&estimate, &objects, &mut |cast| self.cast(cast))?;
         let promising: Vec<usize> = (objects.iter().zip(&evidence))
@@ -40,7 +39,7 @@ impl<'a> Pipeline<'a, '_> {
             return Ok(());
         }
 
-        lobes.task = self.lobe_task(promising.len());
+        lobes.paths = self.lobe_paths(promising.len());
         let lit = estimate.lit(&self.problem.scene);
         let (mut kept, mut refused) = (Vec::new(), Vec::new());
         for &k in &promising {
@@ -92,7 +91,7 @@ impl<'a> Pipeline<'a, '_> {
     }
 
     /// Refits the kept lobes with the present light, for the `refit`th time. Lobes of textured objects stay as they are.
-    pub(super) fn settle_lobes(&mut self, refit: u64) -> Result<(), Termination> {
+    pub(super) fn settle_lobes(&mut self, refit: u64) -> Result {
         let texels = self.estimate.texels.clone();
         let textured =
             |k: usize| (texels.as_ref()).is_some_and(|t| t.textured.get(k) == Some(&true));
@@ -104,9 +103,8 @@ impl<'a> Pipeline<'a, '_> {
         }
         let started = self.monitor.seconds();
         self.monitor.phase("refining lobes");
-        let mut task = self.lobe_task(glossy.len());
-        task.paths *= TRIAL_DIVISOR;
-        let lobes = Lobes::new(task, &self.gbuffer);
+        let mut lobes = self.lobes_of(glossy.len());
+        lobes.paths *= TRIAL_DIVISOR;
         let lit = self.estimate.lit(&self.problem.scene);
         let mut names = Vec::new();
         for k in glossy {
@@ -121,15 +119,15 @@ impl<'a> Pipeline<'a, '_> {
         self.record("lobes refined", started, true, names.join("; "))
     }
 
-    /// The task of fitting the lobes of `objects` objects.
-    fn lobe_task(&self, objects: usize) -> Task<'a> {
+    /// Paths of a trial, if the lobes of `objects` objects are fitted.
+    fn lobe_paths(&self, objects: usize) -> u64 {
         let divisor = MAX_FULL_TRIALS.max(objects as u64);
-        Task {
-            problem: self.problem,
-            seed: self.monitor.settings.seed,
-            paths: self.budget.round_paths / TRIAL_DIVISOR * MAX_FULL_TRIALS / divisor,
-            max_bounces: self.max_bounces,
-        }
+        self.budget.round_paths / TRIAL_DIVISOR * MAX_FULL_TRIALS / divisor
+    }
+
+    fn lobes_of(&self, objects: usize) -> Lobes<'a> {
+        let (seed, paths) = (self.monitor.settings.seed, self.lobe_paths(objects));
+        Lobes::new(self.problem, &self.gbuffer, seed, paths, self.max_bounces)
     }
 
     /// Sets an object's lobe and base, and resets the prior of its albedo, which assumed a diffuse surface.
@@ -140,7 +138,7 @@ impl<'a> Pipeline<'a, '_> {
         self.prior.forget_albedo(k);
     }
 
-    fn cast(&mut self, cast: RayCount) -> Result<(), Termination> {
+    fn cast(&mut self, cast: RayCount) -> Result {
         self.monitor.cast(cast);
         self.monitor
             .tick(&self.estimate, &|_| self.checkpoint.clone())

@@ -4,10 +4,9 @@ use crate::calibrate::measured_radiance::MeasuredRadiance;
 use crate::inverse::fit::prior::ExpectedAlbedo;
 use crate::inverse::fit::robust_weights::RobustWeights;
 use crate::inverse::paths::PathCache;
-use crate::inverse::pipeline::Pipeline;
 use crate::inverse::pipeline::outside::LightField;
+use crate::inverse::pipeline::{Pipeline, Result};
 use crate::inverse::roles::Role;
-use crate::inverse::solver::Termination;
 use crate::inverse::unknowns::Unknowns;
 use crate::math::color::luminance;
 use crate::transport::emitters::Emitters;
@@ -19,9 +18,8 @@ const LIGHT_FIELD_BIAS: f32 = 0.01;
 const MIN_DEVIATION: f32 = 1e-3;
 
 impl Pipeline<'_, '_> {
-    /// First stage: paths end at measured radiance, so that each object's albedo is nearly an independent linear fit of its
-    /// radiance to its irradiance.
-    pub(super) fn light_field(&mut self) -> Result<(), Termination> {
+    /// First stage: paths end at measured radiance, so that each object's albedo is nearly a linear fit of its own.
+    pub(super) fn light_field(&mut self) -> Result {
         let started = self.monitor.seconds();
         self.monitor.phase("gathering light from the photographs");
         let measured = MeasuredRadiance::new(self.problem, &self.gbuffer);
@@ -76,17 +74,11 @@ impl Pipeline<'_, '_> {
         self.prior.albedo = expected;
     }
 
-    /// Fits all seen objects as reflectors, then settles which are emitters. Outside light is fitted if `outside` is
-    /// [`Role::Unseen`].
-    pub(super) fn tell_lamps(
-        &mut self,
-        cache: &PathCache,
-        outside: Role,
-    ) -> Result<(), Termination> {
+    /// Fits all seen objects as reflectors, then settles which emit. Outside light is fitted if `outside` is [`Role::Unseen`].
+    pub(super) fn tell_lamps(&mut self, cache: &PathCache, outside: Role) -> Result {
         self.unknowns = Unknowns::new(self.roles.len());
         self.robust = RobustWeights::even(self.roles.len());
-        // Seen lamps first: while they are fitted as white walls, unseen objects and the outside would be given light to explain
-        // them.
+        // Seen lamps first: while they are white walls, unseen objects and the outside would be given light to explain them.
         for out_of_sight in [Role::Dark, Role::Unseen] {
             for (k, role) in self.roles.iter_mut().enumerate() {
                 match self.gbuffer.seen.get(k) {
@@ -110,7 +102,6 @@ impl Pipeline<'_, '_> {
         Ok(())
     }
 
-    /// Number of objects that emit light.
     fn lamps(&self) -> usize {
         self.roles.iter().filter(|r| r.emits()).count()
     }

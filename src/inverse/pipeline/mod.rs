@@ -7,19 +7,17 @@ mod emitters;
 mod fitting;
 mod full_paths;
 mod gloss;
-mod known;
 mod light_field;
 mod outside;
 mod record;
 mod refine;
-mod refit;
 mod state;
 mod sun;
 mod textures;
 mod trace;
 mod unseen_emitters;
 
-use crate::calibrate::calibrated::{Calibrated, CalibrationOptions};
+use crate::calibrate::calibrated::Calibrated;
 use crate::calibrate::exposure::Exposures;
 use crate::calibrate::gbuffer::GBuffer;
 use crate::calibrate::held_out::HoldOut;
@@ -44,7 +42,6 @@ use crate::inverse::unknowns::Unknowns;
 use crate::transport::material::Lobe;
 use crate::transport::surroundings::Surroundings;
 use glam::Vec3;
-use refine::Summed;
 use textures::Detail;
 
 /// Columns and rows of the fitted map of outside light.
@@ -52,8 +49,10 @@ const OUTSIDE_WIDTH: usize = 12;
 const OUTSIDE_HEIGHT: usize = 6;
 /// Greatest number of bounces of losses, textures, lobes and lamp patches; the paths of fits end by Russian roulette alone.
 const MAX_DEPTH: u32 = 1000;
-/// Number of stages of a complete solve.
 const STAGES: u32 = 4;
+
+/// What a step of the algorithm returns; it fails only where the solve has to end early.
+type Result<T = ()> = std::result::Result<T, Termination>;
 
 /// The state of a solve.
 pub struct Pipeline<'a, 'o> {
@@ -62,8 +61,6 @@ pub struct Pipeline<'a, 'o> {
     monitor: Monitor<'o>,
     gbuffer: GBuffer,
     clusters: Vec<Cluster>,
-    /// Image width of each frame.
-    widths: Vec<u32>,
     /// Area of the mesh in square metres.
     mesh_area: f64,
     losses: LossProbe,
@@ -89,8 +86,6 @@ pub struct Pipeline<'a, 'o> {
     /// Exposures, vignetting and response, if any is needed.
     exposures: Option<Exposures>,
     estimate: Estimate,
-    /// The sum over all rounds, after they are done.
-    summed: Option<Summed>,
     /// Textures, after their stage.
     detail: Option<Detail>,
     /// Mean of each surface's brightest channel in the photographs; zero for unseen surfaces.
@@ -132,13 +127,11 @@ pub fn solve(
         rays,
     } = Calibrated::new(
         problem,
-        CalibrationOptions {
-            hold_out: HoldOut::from(settings),
-            seed: settings.seed,
-            pixels: budget.gbuffer_pixels,
-            leave_out: settings.leave_out,
-            exposures: settings.exposures,
-        },
+        HoldOut::from(settings),
+        settings.seed,
+        budget.gbuffer_pixels,
+        settings.leave_out,
+        settings.exposures,
     );
     let problem = &problem;
     monitor.progress.rays += rays;
@@ -164,7 +157,6 @@ pub fn solve(
         brightness: brightness(&clusters, surfaces),
         clusters,
         gbuffer,
-        widths: problem.photographs.iter().map(|p| p.width).collect(),
         mesh_area: problem.scene.objects.iter().map(|o| o.area).sum(),
         max_bounces,
         outside,
@@ -182,7 +174,6 @@ pub fn solve(
         lobes: vec![None; objects],
         exposures: exposures.clone().filter(Exposures::needed),
         estimate: Estimate::default(),
-        summed: None,
         detail: None,
         stages: 0,
     };
@@ -204,7 +195,7 @@ pub fn solve(
 
 impl Pipeline<'_, '_> {
     /// The algorithm: runs the stages that are not finished yet.
-    fn run(&mut self) -> Result<Termination, Termination> {
+    fn run(&mut self) -> Result<Termination> {
         if self.stages < 1 {
             self.light_field()?;
             self.end_stage(1)?;

@@ -10,10 +10,8 @@ use crate::inverse::outside::MeasuredOutside;
 use crate::inverse::paths::clusters::mean_radiance;
 use crate::inverse::paths::evaluate::Linearised;
 use crate::inverse::paths::{CachedCluster, PathCache};
-use crate::inverse::pipeline::Pipeline;
-use crate::inverse::roles;
-use crate::inverse::roles::Role;
-use crate::inverse::solver::Termination;
+use crate::inverse::pipeline::{Pipeline, Result};
+use crate::inverse::roles::{self, Role};
 use crate::inverse::unknowns::Unknowns;
 use crate::math::color::luminance;
 use crate::transport::emitters::Emitters;
@@ -26,8 +24,7 @@ const ESCAPING: f64 = 1e-3;
 const OUTSIDE_GAIN: f64 = 0.03;
 /// Standard errors by which the squared error falls.
 const FALL_ERRORS: f64 = 4.0;
-/// Standard errors by which a sun's light exceeds zero: the usual bound for one unknown, since the squared error decides about its
-/// direction.
+/// Standard errors by which a sun's light exceeds zero, as usual for one unknown: the squared error decides about its direction.
 const SUN_ERRORS: f32 = 3.0;
 
 /// Stored paths that end in measured radiance, and what more of them are traced with.
@@ -38,9 +35,9 @@ pub(super) struct LightField<'a> {
     pub measured: &'a MeasuredRadiance,
 }
 
-/// The result of a trial of outside light.
+/// What a trial changes, to go back to.
 #[derive(Clone)]
-struct Found {
+pub(super) struct Found {
     roles: Vec<Role>,
     unknowns: Unknowns,
     errors: StandardErrors,
@@ -76,7 +73,7 @@ impl Pipeline<'_, '_> {
     /// Tries light from outside the mesh, where paths leave it. A scan gets it without a test: what was not scanned reflects light,
     /// if nothing else, and the light field without it makes walls lighter, or gives them light of their own, until nothing is left
     /// to improve.
-    pub(super) fn light_from_outside(&mut self, field: LightField) -> Result<(), Termination> {
+    pub(super) fn light_from_outside(&mut self, field: LightField) -> Result {
         let escaping = field.cache.fraction_ending_on(self.outside.first);
         if escaping <= ESCAPING || !self.monitor.settings.outside_light {
             return Ok(());
@@ -97,7 +94,7 @@ impl Pipeline<'_, '_> {
 
     /// Tries light from infinity, without a sun and with one if there is a candidate. Keeps it if the light field's squared error
     /// falls clearly. A mesh that is not a scan is assumed to lack windows only. Returns in words what the light does.
-    fn light_through_windows(&mut self, field: LightField) -> Result<String, Termination> {
+    fn light_through_windows(&mut self, field: LightField) -> Result<String> {
         // A linear step estimates the gain at a small fraction of the cost of a trial.
         let gain = self.outside_gain(field.cache);
         if gain < OUTSIDE_GAIN {
@@ -125,7 +122,7 @@ impl Pipeline<'_, '_> {
     }
 
     /// Fits light from a box around a scan, and tries a sun beyond it. Returns in words what the light does.
-    fn light_around_scan(&mut self, field: LightField) -> Result<String, Termination> {
+    fn light_around_scan(&mut self, field: LightField) -> Result<String> {
         let scene = &self.problem.scene;
         let cameras = scene.cameras.iter().map(|camera| camera.center);
         let around = Surroundings::around(scene.positions.iter().copied().chain(cameras));
@@ -150,7 +147,7 @@ impl Pipeline<'_, '_> {
         mut plain: Trial,
         needed: f64,
         field: LightField,
-    ) -> Result<Trial, Termination> {
+    ) -> Result<Trial> {
         let sun = self.find_sun(plain.paths.take().as_ref().unwrap_or(field.cache));
         if sun.is_none() {
             return Ok(plain);
@@ -170,12 +167,7 @@ impl Pipeline<'_, '_> {
     }
 
     /// Adds a sun to the present fit. `prior` expects nothing of what was found without it.
-    fn add_sun(
-        &mut self,
-        sun: Option<Vec3>,
-        prior: Prior,
-        field: LightField,
-    ) -> Result<Trial, Termination> {
+    fn add_sun(&mut self, sun: Option<Vec3>, prior: Prior, field: LightField) -> Result<Trial> {
         self.outside.sun = sun;
         self.prior = prior;
         self.expect_of_outside();
@@ -210,7 +202,7 @@ impl Pipeline<'_, '_> {
         surroundings: Surroundings,
         sun: Option<Vec3>,
         field: LightField,
-    ) -> Result<Trial, Termination> {
+    ) -> Result<Trial> {
         self.open = true;
         self.outside.surroundings = surroundings;
         self.outside.sun = sun;
@@ -226,14 +218,14 @@ impl Pipeline<'_, '_> {
     }
 
     /// Paths as of the light field, with the present light from outside.
-    fn paths_of(&mut self, field: LightField) -> Result<PathCache, Termination> {
+    fn paths_of(&mut self, field: LightField) -> Result<PathCache> {
         let count = self.budget.light_field_paths;
         let (paths, _) = self.stored(field.lights, Some(field.measured), 0, count)?;
         Ok(paths)
     }
 
     /// Fits again with the expected colours of outside light. `paths` replace the stored ones of `cache`.
-    fn trial(&mut self, paths: Option<PathCache>, cache: &PathCache) -> Result<Trial, Termination> {
+    fn trial(&mut self, paths: Option<PathCache>, cache: &PathCache) -> Result<Trial> {
         let cache = paths.as_ref().unwrap_or(cache);
         self.expect_colors_of_outside();
         self.weigh(cache)?;
@@ -244,7 +236,7 @@ impl Pipeline<'_, '_> {
         })
     }
 
-    fn found(&self) -> Found {
+    pub(super) fn found(&self) -> Found {
         Found {
             roles: self.roles.clone(),
             unknowns: self.unknowns.clone(),
@@ -257,7 +249,7 @@ impl Pipeline<'_, '_> {
         }
     }
 
-    fn go_back_to(&mut self, found: Found) {
+    pub(super) fn go_back_to(&mut self, found: Found) {
         self.roles = found.roles;
         self.unknowns = found.unknowns;
         self.errors = found.errors;

@@ -4,7 +4,7 @@ use crate::calibrate::exposure::Exposures;
 use crate::inverse::fit::model_error;
 use crate::inverse::loss::LateLight;
 use crate::inverse::paths::evaluate::Linearised;
-use crate::inverse::pipeline::{MAX_DEPTH, Pipeline, STAGES, describe};
+use crate::inverse::pipeline::{MAX_DEPTH, Pipeline, Result, STAGES, describe};
 use crate::inverse::solver::{Checkpoint, Solution, Stage, Termination};
 use glam::{DVec2, Vec3};
 
@@ -12,18 +12,8 @@ use glam::{DVec2, Vec3};
 const COMMON_DEPTH: u32 = 10;
 
 impl Pipeline<'_, '_> {
-    /// Updates the estimate from the present unknowns.
     pub(super) fn describe(&mut self) {
-        self.estimate = describe::estimate(
-            &self.problem.scene,
-            &self.gbuffer,
-            &self.roles,
-            &self.unknowns,
-            &self.errors,
-            self.outside,
-            self.sky.as_ref(),
-            &self.lobes,
-        );
+        self.estimate = self.fitted_estimate();
         model_error::add_to(&mut self.estimate, &self.roles, self.model_variance);
         model_error::add_gloss(&mut self.estimate, &self.roles);
         // One known albedo settles the factor.
@@ -64,39 +54,25 @@ impl Pipeline<'_, '_> {
     }
 
     /// Records a stage with its losses, and adds them to the loss curve.
-    pub(super) fn record(
-        &mut self,
-        name: &str,
-        started: f64,
-        kept: bool,
-        why: String,
-    ) -> Result<(), Termination> {
-        let losses = self.measure();
-        self.record_with(losses, name, started, kept, why);
+    pub(super) fn record(&mut self, name: &str, started: f64, kept: bool, why: String) -> Result {
+        let [train_loss, held_out_loss] = self.measure();
+        self.record_unmeasured(name, started, kept, why);
+        if let Some(stage) = self.monitor.progress.stages.last_mut() {
+            (stage.train_loss, stage.held_out_loss) = (train_loss, held_out_loss);
+        }
         self.monitor
             .report(&self.estimate, &|_| self.checkpoint.clone())
     }
 
     /// Records a stage that leaves the estimate as it is, without losses.
     pub(super) fn record_unmeasured(&mut self, name: &str, started: f64, kept: bool, why: String) {
-        self.record_with([None; 2], name, started, kept, why);
-    }
-
-    fn record_with(
-        &mut self,
-        [train_loss, held_out_loss]: [Option<f64>; 2],
-        name: &str,
-        started: f64,
-        kept: bool,
-        why: String,
-    ) {
         let seconds = self.monitor.seconds() - started;
         self.monitor.progress.stages.push(Stage {
             name: name.to_owned(),
             seconds,
             iterations: self.monitor.progress.iterations,
-            train_loss,
-            held_out_loss,
+            train_loss: None,
+            held_out_loss: None,
             kept,
             why,
         });
@@ -159,13 +135,12 @@ impl Pipeline<'_, '_> {
     }
 
     /// Ends a stage: updates the checkpoint, and offers it to the observer.
-    pub(super) fn end_stage(&mut self, stages: u32) -> Result<(), Termination> {
+    pub(super) fn end_stage(&mut self, stages: u32) -> Result {
         self.keep_checkpoint(stages);
         self.monitor
             .report(&self.estimate, &|_| self.checkpoint.clone())
     }
 
-    /// Updates the checkpoint after `stages` finished stages.
     pub(super) fn keep_checkpoint(&mut self, stages: u32) {
         self.stages = stages;
         self.monitor.progress.seconds = self.monitor.seconds();

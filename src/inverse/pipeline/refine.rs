@@ -8,11 +8,10 @@ use crate::inverse::fit::linear::{Descended, descend};
 use crate::inverse::fit::path_noise;
 use crate::inverse::paths::evaluate::Linearised;
 use crate::inverse::paths::lamp_patches::LampPatches;
-use crate::inverse::pipeline::Pipeline;
 use crate::inverse::pipeline::budget::{ACCURATE, Aim};
-use crate::inverse::pipeline::refit::increase;
-use crate::inverse::roles;
-use crate::inverse::roles::Role;
+use crate::inverse::pipeline::textures::increase;
+use crate::inverse::pipeline::{Pipeline, Result};
+use crate::inverse::roles::{self, Role};
 use crate::inverse::solver::Termination;
 use crate::inverse::unknowns::Unknowns;
 use crate::math::stats::quantile;
@@ -39,27 +38,21 @@ const LIGHTING_LAMPS: u64 = 32;
 /// objects that are less accurate are not waited for.
 const ENOUGH_FOR_TEXTURES: f64 = 5e-3;
 
-/// The linearised clusters over all rounds.
-pub struct Summed {
-    /// Mean over the rounds of each cluster.
-    pub clusters: Vec<Linearised>,
-    /// The unknowns that they are linearised about.
-    pub about: Unknowns,
-}
-
-/// The sum over rounds of paths.
 pub(super) struct Rounds {
     lights: Emitters,
     /// Rows of the free parameters.
     places: Vec<usize>,
     /// The unknowns that the sums are linearised about.
-    about: Unknowns,
+    pub about: Unknowns,
     sums: Accumulated,
     next: u32,
+    /// Whether rounds were added since the last refit.
+    pub has_new: bool,
 }
 
 impl Rounds {
-    fn mean(&self, roles: &[Role]) -> Vec<Linearised> {
+    /// The mean over the rounds of each cluster.
+    pub fn mean(&self, roles: &[Role]) -> Vec<Linearised> {
         let mut clusters = self.sums.mean();
         lamp_albedo::hold_exitance(&mut clusters, roles, &self.places);
         clusters
@@ -70,14 +63,13 @@ impl Rounds {
 enum Leg {
     /// Until the light is accurate enough for textures.
     UntilTextures,
-    /// Until the end.
     UntilDone,
 }
 
 impl Pipeline<'_, '_> {
     /// Third stage: sums rounds of independent paths until the reported errors reach the target. Textures are fitted as soon as
     /// errors are small enough for them, or after the budget's number of rounds.
-    pub(super) fn refine(&mut self) -> Result<Termination, Termination> {
+    pub(super) fn refine(&mut self) -> Result<Termination> {
         let before = self.held_out_each();
         let mut rounds = self.begin_rounds()?;
         let textures = self.monitor.settings.textures;
@@ -85,7 +77,7 @@ impl Pipeline<'_, '_> {
             self.add_rounds(&mut rounds, Leg::UntilTextures)?;
             self.doubt_refinement(&before);
             self.detail()?;
-            self.refit()?;
+            self.refit(&mut rounds)?;
         }
         let ended = self.add_rounds(&mut rounds, Leg::UntilDone)?;
         if self.detail.is_none() {
@@ -95,13 +87,12 @@ impl Pipeline<'_, '_> {
             }
         }
         if textures {
-            self.refit()?;
+            self.refit(&mut rounds)?;
         }
         Ok(ended)
     }
 
-    /// Warns if held-out pixels became clearly worse: the fit then explains the pixels in it by light or colours that are not
-    /// there.
+    /// Warns if held-out pixels became clearly worse: the fit then explains its pixels by light or colours that are not there.
     fn doubt_refinement(&mut self, before: &[f64]) {
         let after = self.held_out_each();
         let increase = increase(before, &after);
@@ -115,7 +106,7 @@ impl Pipeline<'_, '_> {
     }
 
     /// Sets the weights and paths of clusters, and starts empty sums.
-    fn begin_rounds(&mut self) -> Result<Rounds, Termination> {
+    fn begin_rounds(&mut self) -> Result<Rounds> {
         self.monitor.phase("refining");
         let lights = self.lights();
         self.patches = LampPatches::new(&self.problem.scene, &self.roles);
@@ -129,11 +120,12 @@ impl Pipeline<'_, '_> {
             about: self.unknowns.clone(),
             sums: Accumulated::default(),
             next: 0,
+            has_new: false,
         })
     }
 
     /// Adds rounds until the reported errors reach the target, or up to the greatest number of rounds.
-    fn add_rounds(&mut self, rounds: &mut Rounds, leg: Leg) -> Result<Termination, Termination> {
+    fn add_rounds(&mut self, rounds: &mut Rounds, leg: Leg) -> Result<Termination> {
         if rounds.next > 0 && rounds.next >= self.aim_of(leg).0 {
             return Ok(Termination::Steps);
         }
@@ -180,10 +172,7 @@ impl Pipeline<'_, '_> {
                 break;
             }
         }
-        self.summed = Some(Summed {
-            clusters: rounds.mean(&self.roles),
-            about: rounds.about.clone(),
-        });
+        rounds.has_new = true;
         let reported = self.reported();
         let [median, tail] = reported.all.map(|e| e * 100.0);
         let [median_of_paths, tail_of_paths] = reported.of_paths.map(|e| e * 100.0);
@@ -272,7 +261,7 @@ impl Pipeline<'_, '_> {
 
     /// Weights the clusters by levels predicted from a few paths, which are independent of those of the rounds. Each albedo is
     /// raised by its standard error: objects wrongly estimated as black would otherwise get too much weight.
-    fn weigh_by_prediction(&mut self, lights: &Emitters) -> Result<(), Termination> {
+    fn weigh_by_prediction(&mut self, lights: &Emitters) -> Result {
         self.distribute(self.budget.round_paths / PREDICTING);
         let least =
             (self.budget.round_paths / self.clusters.len().max(1) as u64).min(MIN_PREDICTING);
@@ -335,9 +324,8 @@ impl Reported {
     }
 }
 
-/// Whether a step's second-order term, about its square, is not small compared with the standard errors. Albedos count
-/// absolutely, emissions relatively. Badly determined lamps do not count: radiance is linear in them, and albedos depend little
-/// on them.
+/// Whether a step's second-order term, about its square, is not small compared with the standard errors. Albedos count absolutely,
+/// emissions relatively. Badly determined lamps do not count: radiance is linear in them, and albedos depend little on them.
 fn is_nonlinear(from: &Unknowns, to: &Unknowns, errors: &StandardErrors) -> bool {
     let exceeds = |step: Vec3, size: Vec3, error: Vec3| {
         let known = error.cmpgt(Vec3::ZERO) & error.cmplt(Vec3::INFINITY);

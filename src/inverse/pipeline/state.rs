@@ -17,7 +17,6 @@ use serde::{Deserialize, Serialize};
 pub struct SolverState {
     stages: u32,
     open: bool,
-    /// Distance of the outside light.
     #[serde(default)]
     surroundings: Surroundings,
     /// The unit direction towards the sun, if one was found.

@@ -17,7 +17,7 @@ use crate::scene::Scene;
 use crate::scene::geometry::{Ray, offset_origin};
 use crate::transport::environment::direction_of;
 use crate::transport::surroundings::Surroundings;
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 
 /// Columns of the maps of candidates, from coarse to fine; twice the rows. A finest pixel has 1.4 degrees.
@@ -53,15 +53,10 @@ struct Patch {
 
 impl Patch {
     /// The patch of a cluster; `None` if nothing of the mesh is seen there.
-    fn new(
-        scene: &Scene,
-        width: u32,
-        cluster: &Cluster,
-        [dark, bright]: [&Linearised; 2],
-    ) -> Option<Self> {
+    fn new(scene: &Scene, cluster: &Cluster, [dark, bright]: [&Linearised; 2]) -> Option<Self> {
         let pixel = cluster.pixels[cluster.pixels.len() / 2];
-        let center = Vec2::new((pixel % width) as f32 + 0.5, (pixel / width) as f32 + 0.5);
-        let ray = scene.cameras[cluster.frame as usize].ray(center);
+        let camera = &scene.cameras[cluster.frame as usize];
+        let ray = camera.ray(camera.corner(pixel as usize) + 0.5);
         let hit = scene.intersect(&ray)?;
         let normal = scene.normals[hit.triangle as usize];
         let measured = f64::from(luminance(cluster.measured));
@@ -187,8 +182,7 @@ fn directions(columns: usize) -> impl Iterator<Item = Vec3> {
 }
 
 impl Pipeline<'_, '_> {
-    /// The direction towards a sun that explains the photographs better than the present fit of the light field does; `None` if
-    /// none does.
+    /// The direction towards a sun that explains the photographs better than the present fit of the light field, if there is one.
     pub(super) fn find_sun(&self, cache: &PathCache) -> Option<Vec3> {
         // Without light samples, paths would hardly ever meet the sun.
         if self.monitor.settings.light_sampling == LightSampling::Bsdf {
@@ -213,11 +207,9 @@ impl Pipeline<'_, '_> {
         let mut patches: Vec<Patch> = (cache.clusters.iter().enumerate())
             .filter_map(|(i, cached)| {
                 let cluster = &cached.cluster;
-                if self.roles[cluster.object as usize] != Role::Reflector {
-                    return None;
-                }
-                let width = self.widths[cluster.frame as usize];
-                Patch::new(scene, width, cluster, [&residuals[0][i], &residuals[1][i]])
+                let reflects = self.roles[cluster.object as usize] == Role::Reflector;
+                let radiances = residuals.each_ref().map(|of_sky| &of_sky[i]);
+                reflects.then(|| Patch::new(scene, cluster, radiances))?
             })
             .collect();
         patches.sort_by_key(|patch| patch.object);

@@ -1,13 +1,14 @@
-//! The stage of textures.
+//! The stage of textures, and the fit of all albedos and lamps with their effect.
 
 use crate::calibrate::held_out::HoldOut;
 use crate::calibrate::sharpness::Sharpness;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::paths::evaluate::Linearised;
-use crate::inverse::pipeline::Pipeline;
+use crate::inverse::pipeline::refine::Rounds;
+use crate::inverse::pipeline::{Pipeline, Result};
 use crate::inverse::roles::Role;
-use crate::inverse::solver::Termination;
 use crate::inverse::texture::{Refined, Task, refine};
+use crate::math::stats::Moments;
 use crate::transport::arrival::RayCount;
 use glam::{DVec3, Vec3};
 use std::cell::Cell;
@@ -22,8 +23,9 @@ pub(super) struct Detail {
     pub offsets: Vec<DVec3>,
 }
 
-/// Greatest factor by which a texture is scaled.
 const MAX_SCALE: f32 = 1.5;
+/// Increase of the held-out loss, in standard errors, above which the refit is undone.
+const SIGNIFICANT: f64 = 2.0;
 
 impl Detail {
     /// The textures scaled by the change of their objects' albedos since they were fitted.
@@ -42,6 +44,13 @@ impl Detail {
     }
 }
 
+/// Mean increase of the loss of held-out pixels, in standard errors; zero if there are none.
+pub(super) fn increase(before: &[f64], after: &[f64]) -> f64 {
+    let increase: Moments = before.iter().zip(after).map(|(b, a)| a - b).collect();
+    let errors = increase.mean / increase.standard_error();
+    if errors.is_nan() { 0.0 } else { errors }
+}
+
 impl Pipeline<'_, '_> {
     /// Subtracts the effect of the textures from the residuals, if it is traced.
     pub(super) fn leave_textures_out(&self, clusters: &mut [Linearised]) {
@@ -52,7 +61,7 @@ impl Pipeline<'_, '_> {
     }
 
     /// Tries a texture on every reflector without a known albedo.
-    pub(super) fn detail(&mut self) -> Result<(), Termination> {
+    pub(super) fn detail(&mut self) -> Result {
         let started = self.monitor.seconds();
         self.monitor.phase("looking for textures");
         let objects: Vec<usize> = (0..self.problem.scene.objects.len())
@@ -113,5 +122,79 @@ impl Pipeline<'_, '_> {
         // The stage is recorded even if it ended early.
         let recorded = self.record("textures", started, kept, why);
         ended.and(recorded)
+    }
+
+    /// Fits the sum of all rounds, if some are new, to the photographs minus the change by the textures, which is traced once.
+    /// Textures are scaled with the mean albedo of their objects.
+    ///
+    /// Without this, the light from a textured object, and mixed pixels at its edges, would be those of its mean colour.
+    pub(super) fn refit(&mut self, rounds: &mut Rounds) -> Result {
+        let detail = self.detail.clone();
+        let texels = detail.as_ref().and_then(|d| d.refined.texels.clone());
+        let has_new = std::mem::take(&mut rounds.has_new);
+        let (Some(detail), Some(texels), true) = (detail, texels, has_new) else {
+            return Ok(());
+        };
+        let started = self.monitor.seconds();
+        self.monitor.phase("fitting again with textures");
+        let before = (
+            self.unknowns.clone(),
+            self.errors.clone(),
+            self.held_out_each(),
+        );
+        let lights = self.lights();
+        self.distribute(self.budget.round_paths);
+        // The change by textures is relative to the mean albedos that they were fitted with.
+        let mut flat = self.unknowns.clone();
+        for (k, albedo) in detail.albedo.iter().enumerate() {
+            if texels.textured.get(k) == Some(&true) {
+                flat.albedo[k] = *albedo;
+            }
+        }
+        let colors = &texels.colors.colors;
+        let offsets = self.traced(&lights, None, 4, 0, |slice| {
+            slice.texture_offsets(&flat, colors)
+        })?;
+        self.detail = Some(Detail {
+            offsets,
+            ..detail.clone()
+        });
+        let mut clusters = rounds.mean(&self.roles);
+        self.leave_textures_out(&mut clusters);
+        self.descend(clusters, &rounds.about);
+        self.describe();
+
+        let after = self.held_out_each();
+        let increase = increase(&before.2, &after);
+        let kept = increase <= SIGNIFICANT;
+        if !kept {
+            (self.unknowns, self.errors, self.detail) = (before.0.clone(), before.1, Some(detail));
+            self.describe();
+        }
+        let change = (0..self.problem.scene.objects.len())
+            .filter(|&k| self.roles[k].reflects())
+            .map(|k| {
+                (self.unknowns.albedo[k] - before.0.albedo[k])
+                    .abs()
+                    .max_element()
+            })
+            .fold(0.0, f32::max);
+        let why = match kept {
+            true => {
+                format!(
+                    "with the light that textures reflect, albedos change by {change:.3} at most"
+                )
+            }
+            false => format!(
+                "held-out pixels get worse by {increase:.1} standard errors, so the refit is undone"
+            ),
+        };
+        self.record("refit", started, kept, why)
+    }
+
+    pub(super) fn held_out_each(&mut self) -> Vec<f64> {
+        let (each, cast) = self.losses.held_out_each(self.problem, &self.estimate);
+        self.monitor.cast(cast);
+        each
     }
 }

@@ -7,18 +7,15 @@ use crate::inverse::paths::clusters::{Cluster, cluster};
 use crate::inverse::paths::memory::PILOT_CLUSTERS;
 use crate::inverse::paths::trace::{Tracer, max_mean_path_length};
 use crate::inverse::paths::{PathCache, memory};
-use crate::inverse::pipeline::Pipeline;
+use crate::inverse::pipeline::{Pipeline, Result};
 use crate::inverse::roles::Role;
-use crate::inverse::solver::Termination;
 use crate::transport::emitters::Emitters;
 use std::time::{Duration, Instant};
 
-/// Target duration of a slice.
 const SLICE: Duration = Duration::from_millis(25);
 /// Memory limit of stored paths over that of one slice.
 const SLICE_FRACTION: u64 = 8;
 
-/// Number of paths of clusters, in both sets.
 fn paths(clusters: &[Cluster]) -> u64 {
     (clusters.iter())
         .map(|c| 2 * u64::from(c.paths) * c.pixels.len() as u64)
@@ -26,7 +23,6 @@ fn paths(clusters: &[Cluster]) -> u64 {
 }
 
 impl Pipeline<'_, '_> {
-    /// Distributes `paths` paths over the clusters.
     pub(super) fn distribute(&mut self, paths: u64) {
         distribute_paths(&mut self.clusters, self.roles.len(), paths);
     }
@@ -39,7 +35,7 @@ impl Pipeline<'_, '_> {
         measured: Option<&MeasuredRadiance>,
         stage: u64,
         paths: u64,
-    ) -> Result<(PathCache, String), Termination> {
+    ) -> Result<(PathCache, String)> {
         let allowed = memory::allowed(self.monitor.settings.memory);
         let mut fits = paths;
         let expected = self.expected_albedo();
@@ -54,7 +50,7 @@ impl Pipeline<'_, '_> {
             let pilot: Vec<_> = self.clusters.iter().step_by(step).cloned().collect();
             let pilot = self
                 .tracer(lights, measured, &expected, stage, 0)
-                .trace(&pilot, &self.widths);
+                .trace(&pilot);
             self.monitor.cast(pilot.cast);
             fits = paths.min(memory::paths_that_fit(allowed, &pilot));
         }
@@ -76,8 +72,7 @@ impl Pipeline<'_, '_> {
         Ok((PathCache::from(clusters), limit))
     }
 
-    /// Traces the clusters' paths in slices, with reports in between, and joins what `of_slice` makes of the slices, in order. The
-    /// paths are not stored.
+    /// Traces the clusters' paths in slices, with reports in between, and joins what `of_slice` makes of each; no path is stored.
     pub(super) fn traced<T>(
         &mut self,
         lights: &Emitters,
@@ -85,7 +80,7 @@ impl Pipeline<'_, '_> {
         stage: u64,
         round: u32,
         of_slice: impl Fn(PathCache) -> Vec<T>,
-    ) -> Result<Vec<T>, Termination> {
+    ) -> Result<Vec<T>> {
         let expected = self.expected_albedo();
         let allowed = memory::allowed(self.monitor.settings.memory) / SLICE_FRACTION;
         let vertices = max_mean_path_length(self.max_albedo(&expected));
@@ -102,7 +97,7 @@ impl Pipeline<'_, '_> {
             let started = Instant::now();
             let traced = self
                 .tracer(lights, measured, &expected, stage, round)
-                .trace(&self.clusters[next..end], &self.widths);
+                .trace(&self.clusters[next..end]);
             self.monitor.cast(traced.cast);
             all.extend(of_slice(traced));
             let elapsed = started.elapsed();
@@ -145,13 +140,14 @@ impl Pipeline<'_, '_> {
         stage: u64,
         round: u32,
     ) -> Tracer<'t> {
+        let texels = self.estimate.texels.as_ref();
         Tracer {
             scene: &self.problem.scene,
             lights,
             measured,
             surface_of: &self.problem.scene.object_of,
             expected_albedo,
-            texels: self.estimate.texels.as_deref(),
+            texels: texels.map(|t| (&t.colors.layout, Some(&*t.textured))),
             lobes: &self.lobes,
             patches: Some(&self.patches),
             sky: self.sky.as_ref(),

@@ -10,16 +10,14 @@ use crate::inverse::fit::gauss_newton::Fit;
 use crate::inverse::fit::robust_weights::RobustWeights;
 use crate::inverse::paths::PathCache;
 use crate::inverse::paths::evaluate::Linearised;
-use crate::inverse::pipeline::Pipeline;
 use crate::inverse::pipeline::emitters::SIGNIFICANT;
+use crate::inverse::pipeline::{Pipeline, Result};
 use crate::inverse::roles::Role;
-use crate::inverse::solver::Termination;
 use crate::inverse::unknowns::Unknowns;
 use crate::math::stats::Moments;
 use crate::transport::emitters::Emitters;
 use glam::{DVec3, Vec3};
 
-/// Greatest number of unseen lamps.
 const MAX_LAMPS: usize = 24;
 /// Greatest number of candidates tried per score test: in the first iteration, which has two tests, and later.
 const MAX_TRIED: [usize; 2] = [4, 2];
@@ -41,18 +39,15 @@ struct Hypothesis {
 impl Hypothesis {
     /// Decrease of the mean residual from this hypothesis to another one, if it is significant.
     fn decrease_to(&self, other: &Self) -> Option<f64> {
-        let mut decrease = Moments::default();
-        for (before, after) in self.residuals.iter().zip(&other.residuals) {
-            decrease.push(before - after);
-        }
+        let pairs = self.residuals.iter().zip(&other.residuals);
+        let decrease: Moments = pairs.map(|(before, after)| before - after).collect();
         (decrease.mean > MIN_DECREASE * decrease.standard_error()).then_some(decrease.mean)
     }
 }
 
 impl Pipeline<'_, '_> {
-    /// Searches for unseen lamps from scratch, without those of the light field. The lamps of the light field are kept unless the
-    /// new ones are significantly better.
-    pub(super) fn search_anew(&mut self) -> Result<(), Termination> {
+    /// Searches for unseen lamps anew. Those of the light field are kept unless the new ones are significantly better.
+    pub(super) fn search_anew(&mut self) -> Result {
         let by_light_field: Vec<usize> = (0..self.problem.scene.objects.len())
             .filter(|&k| self.roles[k] == Role::Unseen && !self.emission_is_known(k))
             .collect();
@@ -76,7 +71,7 @@ impl Pipeline<'_, '_> {
     }
 
     /// Searches for more unseen lamps; `anew` if none is known yet. Returns whether one was found.
-    pub(super) fn search_unseen(&mut self, anew: bool) -> Result<bool, Termination> {
+    pub(super) fn search_unseen(&mut self, anew: bool) -> Result<bool> {
         let dark = |k: usize| self.roles[k] == Role::Dark && !self.emission_is_known(k);
         let mut candidates: Vec<usize> = (0..self.problem.scene.objects.len())
             .filter(|&k| dark(k) && self.problem.scene.objects[k].area > 0.0)
@@ -148,7 +143,7 @@ impl Pipeline<'_, '_> {
         promising: &[ScoreTest],
         present: &Hypothesis,
         paths: u64,
-    ) -> Result<Option<(usize, Hypothesis)>, Termination> {
+    ) -> Result<Option<(usize, Hypothesis)>> {
         let surfaces = self.roles.len();
         let before: (Vec<Role>, Unknowns) = (self.roles.clone(), self.unknowns.clone());
         let mut best: Option<(f64, usize, Hypothesis)> = None;
@@ -168,7 +163,7 @@ impl Pipeline<'_, '_> {
     }
 
     /// Traces full paths with the present lamps, and fits everything to them.
-    fn hypothesis(&mut self, paths: u64) -> Result<Hypothesis, Termination> {
+    fn hypothesis(&mut self, paths: u64) -> Result<Hypothesis> {
         let lights = self.lights();
         let (cache, _) = self.stored(&lights, None, 6, paths)?;
         let fitted = self.fit(&cache)?;

@@ -123,8 +123,8 @@ fn of_pixel(
     for path in 0..paths {
         let mut stream = Stream::new(KEY, frame as u64, pixel as u64, path);
         vertices.clear();
-        let (cast, _) = tracer.pixel_path(camera, corner, &mut stream, &mut vertices);
-        rays += cast;
+        let cast = tracer.pixel_path(camera, corner, &mut stream, &mut vertices);
+        rays += cast.rays;
         gradient.clear();
         differentiate(&vertices, unknowns, &[], &mut gathered, &mut gradient);
         for (parameter, moments) in moments.iter_mut().enumerate() {

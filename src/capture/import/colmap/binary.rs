@@ -1,6 +1,6 @@
 //! Reads cameras.bin and images.bin: little-endian, each beginning with the number of entries.
 
-use crate::capture::import::colmap::model::{self, Image};
+use crate::capture::import::colmap::{self, Image};
 use crate::capture::import::folder::Folder;
 use crate::capture::scan::lens::Lens;
 use crate::error::{Error, Result};
@@ -20,9 +20,20 @@ impl<'a> Cursor<'a> {
         Some(head)
     }
 
-    /// A number by its function `from_le_bytes`.
-    fn number<T, const N: usize>(&mut self, from: fn([u8; N]) -> T) -> Option<T> {
-        self.take(N)?.try_into().ok().map(from)
+    fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
+        self.take(N)?.try_into().ok()
+    }
+
+    fn u32(&mut self) -> Option<u32> {
+        self.array().map(u32::from_le_bytes)
+    }
+
+    fn u64(&mut self) -> Option<u64> {
+        self.array().map(u64::from_le_bytes)
+    }
+
+    fn f64(&mut self) -> Option<f64> {
+        self.array().map(f64::from_le_bytes)
     }
 
     fn text(&mut self) -> Option<String> {
@@ -46,35 +57,23 @@ pub fn cameras(folder: &Folder, name: &str) -> Result<HashMap<u32, Lens>> {
     let bytes = folder.bytes(name, MAX_BYTES)?;
     let mut cursor = Cursor(&bytes);
     let cut = |index| broken(folder, name, index, "is cut off");
-    let count = cursor.number(u64::from_le_bytes).ok_or_else(|| cut(0))?;
+    let count = cursor.u64().ok_or_else(|| cut(0))?;
     let mut cameras = HashMap::new();
     for index in 0..count {
-        let mut head = || {
-            let (id, kind) = (
-                cursor.number(u32::from_le_bytes)?,
-                cursor.number(u32::from_le_bytes)?,
-            );
-            Some((
-                id,
-                kind as i32,
-                cursor.number(u64::from_le_bytes)?,
-                cursor.number(u64::from_le_bytes)?,
-            ))
-        };
+        let mut head = || Some((cursor.u32()?, cursor.u32()?, cursor.u64()?, cursor.u64()?));
         let (id, kind, width, height) = head().ok_or_else(|| cut(index))?;
-        let known = model::MODELS.iter().find(|(number, _, _)| *number == kind);
+        let kind = kind as i32;
+        let known = colmap::MODELS.iter().find(|(number, _, _)| *number == kind);
         let Some((_, model, parameters)) = known else {
             let problem = format!("has the unknown camera model {kind}");
             return Err(broken(folder, name, index, &problem));
         };
-        let values: Option<Vec<f64>> = (0..*parameters)
-            .map(|_| cursor.number(f64::from_le_bytes))
-            .collect();
+        let values: Option<Vec<f64>> = (0..*parameters).map(|_| cursor.f64()).collect();
         let values = values.ok_or_else(|| cut(index))?;
         let (Ok(width), Ok(height)) = (u32::try_from(width), u32::try_from(height)) else {
             return Err(broken(folder, name, index, "has an impossible size"));
         };
-        let lens = model::lens(model, [width, height], &values)
+        let lens = colmap::lens(model, [width, height], &values)
             .map_err(|problem| broken(folder, name, index, &format!("is refused: {problem}")))?;
         cameras.insert(id, lens);
     }
@@ -86,25 +85,19 @@ pub fn images(folder: &Folder, name: &str) -> Result<Vec<Image>> {
     let bytes = folder.bytes(name, MAX_BYTES)?;
     let mut cursor = Cursor(&bytes);
     let cut = |index| broken(folder, name, index, "is cut off");
-    let count = cursor.number(u64::from_le_bytes).ok_or_else(|| cut(0))?;
-    let mut images = Vec::new();
-    for index in 0..count {
-        let image = image(&mut cursor).ok_or_else(|| cut(index))?;
-        images.push(image);
-    }
-    Ok(images)
+    let count = cursor.u64().ok_or_else(|| cut(0))?;
+    let image = |index| image(&mut cursor).ok_or_else(|| cut(index));
+    (0..count).map(image).collect()
 }
 
 fn image(cursor: &mut Cursor) -> Option<Image> {
-    cursor.number(u32::from_le_bytes)?;
-    let mut number = || cursor.number(f64::from_le_bytes);
+    cursor.u32()?;
+    let mut number = || cursor.f64();
     let quaternion = [number()?, number()?, number()?, number()?];
     let translation = DVec3::new(number()?, number()?, number()?);
-    let camera = cursor.number(u32::from_le_bytes)?;
+    let camera = cursor.u32()?;
     let name = cursor.text()?;
-    let points = cursor
-        .number(u64::from_le_bytes)?
-        .checked_mul(POINT_BYTES)?;
+    let points = cursor.u64()?.checked_mul(POINT_BYTES)?;
     cursor.take(usize::try_from(points).ok()?)?;
     Some(Image {
         quaternion,

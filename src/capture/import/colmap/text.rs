@@ -1,6 +1,6 @@
 //! Reads cameras.txt and images.txt.
 
-use crate::capture::import::colmap::model::{self, Image};
+use crate::capture::import::colmap::{self, Image};
 use crate::capture::import::folder::Folder;
 use crate::capture::import::matrix::number;
 use crate::capture::scan::lens::Lens;
@@ -34,7 +34,7 @@ pub fn cameras(folder: &Folder, name: &str) -> Result<HashMap<u32, Lens>> {
             let problem = "is not a line of CAMERA_ID MODEL WIDTH HEIGHT PARAMS";
             return Err(broken(folder, name, index, problem));
         };
-        let lens = model::lens(words[1], size, &parameters)
+        let lens = colmap::lens(words[1], size, &parameters)
             .map_err(|problem| broken(folder, name, index, &problem))?;
         cameras.insert(id, lens);
     }

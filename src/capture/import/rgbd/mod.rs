@@ -5,15 +5,15 @@ pub mod scannet;
 pub mod seven_scenes;
 pub mod tum;
 
+use crate::capture::camera::Pose;
+use crate::capture::import::Scan;
 use crate::capture::import::folder::Folder;
 use crate::capture::import::matrix::rows;
 use crate::capture::read::image;
-use crate::capture::scan::depth;
-use crate::capture::scan::lens::Lens;
+use crate::capture::scan::{DepthImage, ImportedFrame, Lens, depth};
 use crate::error::{Error, Result};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// Usual names of folders of colour images.
 const COLOR_FOLDERS: [&str; 5] = ["color", "rgb", "image", "images", "colour"];
 
 /// The size of a photograph inside the folder, by its header.
@@ -51,11 +51,66 @@ fn possible(lens: Lens, path: &Path) -> Result<Lens> {
     }
 }
 
-/// Adds a remark about frames whose tracking was lost.
-fn remark_on_lost(count: usize, remarks: &mut Vec<String>) {
-    if count > 0 {
-        remarks.push(format!(
-            "{count} frames left out: their pose is not finite (tracking was lost)"
-        ));
+/// The frames of a video as they are read, all with the cameras of the first.
+struct Frames {
+    scan: Scan,
+    /// Metres per unit of depth, and a value besides 0 that marks missing depth.
+    depth_values: (f64, Option<u16>),
+    /// The colour and the depth camera.
+    lenses: Option<[Lens; 2]>,
+    /// Frames without a finite pose.
+    lost: usize,
+}
+
+impl Frames {
+    fn new(metres_per_unit: f64, invalid: Option<u16>) -> Self {
+        Self {
+            scan: Scan {
+                is_video: true,
+                ..Scan::default()
+            },
+            depth_values: (metres_per_unit, invalid),
+            lenses: None,
+            lost: 0,
+        }
+    }
+
+    /// Adds a frame, unless its pose is not finite. `file` finds the files of its photograph and its depth image; `cameras` gives
+    /// both cameras for the first frame, and may add remarks.
+    fn add(
+        &mut self,
+        pose: Option<Pose>,
+        [color, depth]: [&str; 2],
+        file: impl Fn(&str) -> Result<PathBuf>,
+        cameras: impl FnOnce(&mut Vec<String>) -> Result<[Lens; 2]>,
+    ) -> Result<()> {
+        let Some(pose) = pose else {
+            self.lost += 1;
+            return Ok(());
+        };
+        let [lens, depth_lens] = match self.lenses {
+            Some(known) => known,
+            None => *self.lenses.insert(cameras(&mut self.scan.remarks)?),
+        };
+        let photograph = file(color)?;
+        let (unit, invalid) = self.depth_values;
+        let depth = DepthImage {
+            invalid,
+            ..DepthImage::new(file(depth)?, depth_lens, unit)
+        };
+        let frame = ImportedFrame::new(photograph, lens, pose, Some(depth));
+        self.scan.frames.push(frame);
+        Ok(())
+    }
+
+    /// The scan, with a remark about frames whose tracking was lost.
+    fn scan(mut self) -> Scan {
+        if self.lost > 0 {
+            self.scan.remarks.push(format!(
+                "{} frames left out: their pose is not finite (tracking was lost)",
+                self.lost
+            ));
+        }
+        self.scan
     }
 }

@@ -6,13 +6,11 @@
 
 use crate::capture::import::folder::Folder;
 use crate::capture::import::matrix::{numbers, pose_of_rows};
-use crate::capture::import::reader::{ImportOptions, Scan};
 use crate::capture::import::rgbd::{
-    COLOR_FOLDERS, depth_size, opencv_lens, photograph_size, possible, remark_on_lost,
+    COLOR_FOLDERS, Frames, depth_size, opencv_lens, photograph_size, possible,
 };
+use crate::capture::import::{ImportOptions, Scan};
 use crate::capture::read::fields;
-use crate::capture::scan::ImportedFrame;
-use crate::capture::scan::depth::DepthImage;
 use crate::capture::scan::lens::Lens;
 use crate::error::{Error, Result};
 use glam::{DMat4, DVec4};
@@ -65,10 +63,7 @@ fn trajectory_name(folder: &Folder) -> Result<Option<String>> {
 }
 
 pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
-    let mut scan = Scan {
-        is_video: true,
-        ..Scan::default()
-    };
+    let mut frames = Frames::new(0.001, None);
     let missing = |name: &str, remedy: &str| Error::file(&folder.path(name), "is missing", remedy);
     let color = color_folder(folder)
         .ok_or_else(|| missing("color", "put the colour images into a folder of this name"))?;
@@ -87,15 +82,13 @@ pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
     }
     let name = trajectory_name(folder)?
         .ok_or_else(|| missing("trajectory.log", "add the camera trajectory"))?;
-    scan.remarks.push(format!("poses: {name}"));
+    frames.scan.remarks.push(format!("poses: {name}"));
     let place = folder.path(&name).display().to_string();
     let poses = if name.ends_with(".json") {
         from_json(folder, &name)?
     } else {
         from_log(folder, &name)?
     };
-    let mut cameras: Option<[Lens; 2]> = None;
-    let mut left_out = 0;
     for (index, rows) in poses {
         let (Some(color), Some(depth)) = (colors.get(index), depths.get(index)) else {
             return Err(Error::new(
@@ -107,36 +100,20 @@ pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
                 "add the images or shorten the trajectory",
             ));
         };
-        let Some(pose) = pose_of_rows(&format!("{place} frame {index}"), &rows)? else {
-            left_out += 1;
-            continue;
-        };
-        let [lens, depth_lens] = match cameras {
-            Some(known) => known,
-            None => {
-                let lens = camera(
-                    folder,
-                    photograph_size(folder, color)?,
-                    options,
-                    &mut scan.remarks,
-                )?;
-                let depth_lens = lens.resized(depth_size(folder, depth)?);
-                *cameras.insert([lens, depth_lens])
-            }
-        };
-        let photograph = folder.file(&place, color)?;
-        let depth = DepthImage::new(folder.file(&place, depth)?, depth_lens, 0.001);
-        scan.frames
-            .push(ImportedFrame::new(photograph, lens, pose, Some(depth)));
+        let pose = pose_of_rows(&format!("{place} frame {index}"), &rows)?;
+        let file = |name: &str| folder.file(&place, name);
+        frames.add(pose, [color, depth], file, |remarks| {
+            let lens = camera(folder, photograph_size(folder, color)?, options, remarks)?;
+            Ok([lens, lens.resized(depth_size(folder, depth)?)])
+        })?;
     }
-    remark_on_lost(left_out, &mut scan.remarks);
+    let mut scan = frames.scan();
     if let Some(name) = folder.first(&MESHES) {
         scan.mesh = Some(folder.file(&place, name)?);
     }
     Ok(scan)
 }
 
-/// The images of a folder in natural order.
 fn images(folder: &Folder, inside: &str, ends: &[&str]) -> Result<Vec<String>> {
     let names = folder.names(inside)?;
     let is_image = |name: &String| {
@@ -186,21 +163,13 @@ fn from_log(folder: &Folder, name: &str) -> Result<Vec<PosedFrame>> {
 fn from_json(folder: &Folder, name: &str) -> Result<Vec<PosedFrame>> {
     let path = folder.path(name);
     let value = folder.json(name)?;
+    let broken = |problem: &str| Error::file(&path, problem, "export the trajectory again");
     let list = value.get("parameters").and_then(Value::as_array);
-    let list = list.ok_or_else(|| {
-        Error::file(
-            &path,
-            "has no list of parameters",
-            "export the trajectory again",
-        )
-    })?;
+    let list = list.ok_or_else(|| broken("has no list of parameters"))?;
     let pose = |(index, entry): (usize, &Value)| -> Result<PosedFrame> {
         let Some(columns) = column_major(entry.get("extrinsic"), 16) else {
-            return Err(Error::file(
-                &path,
-                format!("parameters[{index}].extrinsic is not a list of 16 numbers"),
-                "export the trajectory again",
-            ));
+            let problem = format!("parameters[{index}].extrinsic is not a list of 16 numbers");
+            return Err(broken(&problem));
         };
         let to_camera = DMat4::from_cols_slice(&columns);
         // A singular matrix counts as a lost frame.

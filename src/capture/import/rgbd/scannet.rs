@@ -3,13 +3,10 @@
 //! Poses are 4×4 camera-to-world matrices with OpenCV's axes, all −inf where tracking was lost; depth is in millimetres.
 //! `*_vh_clean_2.ply` (or `_vh_clean.ply`) is the reconstructed mesh.
 
+use crate::capture::import::Scan;
 use crate::capture::import::folder::Folder;
 use crate::capture::import::matrix::{pose_of_rows, rows};
-use crate::capture::import::reader::Scan;
-use crate::capture::import::rgbd::{depth_size, opencv_camera, photograph_size, remark_on_lost};
-use crate::capture::scan::ImportedFrame;
-use crate::capture::scan::depth::DepthImage;
-use crate::capture::scan::lens::Lens;
+use crate::capture::import::rgbd::{Frames, depth_size, opencv_camera, photograph_size};
 use crate::error::Result;
 use glam::DMat3;
 
@@ -24,23 +21,15 @@ pub fn is_here(folder: &Folder) -> bool {
 }
 
 pub fn read(folder: &Folder) -> Result<Scan> {
-    let mut scan = Scan {
-        is_video: true,
-        mesh: mesh(folder)?,
-        ..Scan::default()
-    };
-    let mut cameras: Option<[Lens; 2]> = None;
-    let mut left_out = 0;
+    let mut frames = Frames::new(0.001, None);
+    frames.scan.mesh = mesh(folder)?;
     for name in folder.names("pose")? {
         let Some(stem) = name.strip_suffix(".txt") else {
             continue;
         };
         let pose_name = format!("pose/{name}");
         let place = folder.path(&pose_name).display().to_string();
-        let Some(pose) = pose_of_rows(&place, &rows(folder, &pose_name)?)? else {
-            left_out += 1;
-            continue;
-        };
+        let pose = pose_of_rows(&place, &rows(folder, &pose_name)?)?;
         let either = |names: [String; 2]| {
             let [usual, other] = names;
             if folder.has(&other) && !folder.has(&usual) {
@@ -51,19 +40,16 @@ pub fn read(folder: &Folder) -> Result<Scan> {
         };
         let color = either([format!("color/{stem}.jpg"), format!("color/{stem}.png")]);
         let depth = either([format!("depth/{stem}.png"), format!("depth/{stem}.pgm")]);
-        let [lens, depth_lens] = match cameras {
-            Some(known) => known,
-            None => *cameras.insert([
+        let cameras = |_: &mut Vec<String>| {
+            Ok([
                 opencv_camera(folder, COLOR_CAMERA, photograph_size(folder, &color)?)?,
                 opencv_camera(folder, DEPTH_CAMERA, depth_size(folder, &depth)?)?,
-            ]),
+            ])
         };
-        let photograph = folder.file(&place, &color)?;
-        let depth = DepthImage::new(folder.file(&place, &depth)?, depth_lens, 0.001);
-        scan.frames
-            .push(ImportedFrame::new(photograph, lens, pose, Some(depth)));
+        let file = |name: &str| folder.file(&place, name);
+        frames.add(pose, [&color, &depth], file, cameras)?;
     }
-    remark_on_lost(left_out, &mut scan.remarks);
+    let mut scan = frames.scan();
     remark_on_extrinsics(folder, &mut scan.remarks)?;
     Ok(scan)
 }

@@ -5,19 +5,15 @@
 
 use crate::capture::import::folder::{Folder, inside};
 use crate::capture::import::matrix::{pose_of_rows, rows};
-use crate::capture::import::reader::{ImportOptions, Scan};
 use crate::capture::import::rgbd::{
-    depth_size, opencv_camera, opencv_lens, photograph_size, remark_on_lost,
+    Frames, depth_size, opencv_camera, opencv_lens, photograph_size,
 };
-use crate::capture::scan::ImportedFrame;
-use crate::capture::scan::depth::DepthImage;
+use crate::capture::import::{ImportOptions, Scan};
 use crate::capture::scan::lens::Lens;
 use crate::error::{Error, Result};
 
 const POSE: &str = ".pose.txt";
-/// Names of 3DMatch's intrinsics.
 const INTRINSICS: [&str; 2] = ["camera-intrinsics.txt", "intrinsics.txt"];
-/// Depth value for missing depth.
 const INVALID: u16 = 65535;
 
 pub fn is_here(folder: &Folder) -> Result<bool> {
@@ -39,12 +35,7 @@ fn sequences(folder: &Folder) -> Result<Vec<String>> {
 }
 
 pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
-    let mut scan = Scan {
-        is_video: true,
-        ..Scan::default()
-    };
-    let mut lenses: Option<[Lens; 2]> = None;
-    let mut left_out = 0;
+    let mut frames = Frames::new(0.001, Some(INVALID));
     for sequence in sequences(folder)? {
         for name in folder.names(&sequence)? {
             let Some(stem) = name.strip_suffix(POSE) else {
@@ -65,27 +56,14 @@ pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
             let depth = either("depth", &["png", "pgm"])?;
             let pose_name = inside(&sequence, &name);
             let place = folder.path(&pose_name).display().to_string();
-            let Some(pose) = pose_of_rows(&place, &rows(folder, &pose_name)?)? else {
-                left_out += 1;
-                continue;
-            };
-            let [lens, depth_lens] = match lenses {
-                Some(known) => known,
-                None => {
-                    *lenses.insert(cameras(folder, &color, &depth, options, &mut scan.remarks)?)
-                }
-            };
-            let photograph = folder.file(&place, &color)?;
-            let depth = DepthImage {
-                invalid: Some(INVALID),
-                ..DepthImage::new(folder.file(&place, &depth)?, depth_lens, 0.001)
-            };
-            scan.frames
-                .push(ImportedFrame::new(photograph, lens, pose, Some(depth)));
+            let pose = pose_of_rows(&place, &rows(folder, &pose_name)?)?;
+            let file = |name: &str| folder.file(&place, name);
+            frames.add(pose, [&color, &depth], file, |remarks| {
+                cameras(folder, &color, &depth, options, remarks)
+            })?;
         }
     }
-    remark_on_lost(left_out, &mut scan.remarks);
-    Ok(scan)
+    Ok(frames.scan())
 }
 
 /// The colour and the depth camera; depth is assumed to be registered to colour.

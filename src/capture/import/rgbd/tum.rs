@@ -10,10 +10,8 @@
 use crate::capture::camera::Pose;
 use crate::capture::import::folder::Folder;
 use crate::capture::import::matrix::{from_opencv, no_quaternion, number, rotation};
-use crate::capture::import::reader::{ImportOptions, Scan};
-use crate::capture::import::rgbd::{depth_size, opencv_lens, photograph_size, remark_on_lost};
-use crate::capture::scan::ImportedFrame;
-use crate::capture::scan::depth::DepthImage;
+use crate::capture::import::rgbd::{Frames, depth_size, opencv_lens, photograph_size};
+use crate::capture::import::{ImportOptions, Scan};
 use crate::capture::scan::lens::{Lens, Model};
 use crate::error::{Error, Result};
 use glam::{DMat3, DVec3};
@@ -29,7 +27,6 @@ const TRAJECTORIES: [&str; 4] = [
     "CameraTrajectory.txt",
     "poses.txt",
 ];
-/// Names of lists of both images.
 const ASSOCIATIONS: [&str; 2] = ["associations.txt", "associated.txt"];
 
 /// A line of a list: timestamp and the words after it.
@@ -57,11 +54,8 @@ fn freiburg(folder: &Folder) -> Result<Option<String>> {
 
 /// Reads the frames; `left_handed` for ICL-NUIM's cameras.
 pub fn read(folder: &Folder, options: &ImportOptions, left_handed: bool) -> Result<Scan> {
-    let mut scan = Scan {
-        is_video: true,
-        mirrored: left_handed,
-        ..Scan::default()
-    };
+    let mut frames = Frames::new(UNIT, None);
+    frames.scan.mirrored = left_handed;
     let (colors, depths) = images(folder, left_handed)?;
     let trajectory_name = match (freiburg(folder)?, folder.first(&TRAJECTORIES)) {
         (Some(name), _) => name,
@@ -78,8 +72,7 @@ pub fn read(folder: &Folder, options: &ImportOptions, left_handed: bool) -> Resu
     // ICL-NUIM's timestamps are frame numbers.
     let tolerance = if left_handed { 0.5 } else { MAX_DIFFERENCE };
 
-    let mut lenses: Option<[Lens; 2]> = None;
-    let (mut without_depth, mut without_pose, mut left_out) = (0, 0, 0);
+    let (mut without_depth, mut without_pose) = (0, 0);
     for color in &colors {
         let Some(depth) = nearest(&depths, color.stamp, tolerance) else {
             without_depth += 1;
@@ -90,34 +83,21 @@ pub fn read(folder: &Folder, options: &ImportOptions, left_handed: bool) -> Resu
             continue;
         };
         let place = folder.path(&trajectory_name).display().to_string();
-        let Some(pose) = pose(&place, line, left_handed)? else {
-            left_out += 1;
-            continue;
-        };
-        let (color, depth) = (&color.words[0], &depth.words[0]);
-        let [lens, depth_lens] = match lenses {
-            Some(known) => known,
-            None => *lenses.insert(cameras(
-                folder,
-                [color, depth],
-                options,
-                left_handed,
-                &mut scan.remarks,
-            )?),
-        };
-        let photograph = folder.existing(color)?;
-        let depth = DepthImage::new(folder.existing(depth)?, depth_lens, UNIT);
-        scan.frames
-            .push(ImportedFrame::new(photograph, lens, pose, Some(depth)));
+        let pose = pose(&place, line, left_handed)?;
+        let names = [color, depth].map(|entry| entry.words[0].as_str());
+        let file = |name: &str| folder.existing(name);
+        frames.add(pose, names, file, |remarks| {
+            cameras(folder, names, options, left_handed, remarks)
+        })?;
     }
     for (count, lacking) in [(without_depth, "depth image"), (without_pose, "pose")] {
         if count > 0 {
-            scan.remarks.push(format!(
+            frames.scan.remarks.push(format!(
                 "{count} photographs left out: no {lacking} within {tolerance} of their timestamp"
             ));
         }
     }
-    remark_on_lost(left_out, &mut scan.remarks);
+    let mut scan = frames.scan();
     if left_handed {
         scan.remarks.push(
             "the left-handed cameras (negative fy) and their world are mirrored: z changes its sign"
