@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::export::part::{mapped_parts, parts};
-use crate::export::table::{Cell, Table};
+use crate::export::table::Table;
 use crate::export::{glb, mitsuba, obj, overwrite, ply, probe};
 use crate::inverse::estimate::{Estimate, ObjectEstimate};
 use crate::scene::Scene;
@@ -99,26 +99,19 @@ fn table(scene: &Scene, estimate: &Estimate) -> Table {
     let unknown = ObjectEstimate::default();
     for (index, object) in scene.objects.iter().enumerate() {
         let known = estimate.objects.get(index).unwrap_or(&unknown);
-        let mut row: Vec<Cell> = vec![object.name.as_str().into()];
-        for color in [
-            known.albedo,
-            known.albedo_stderr,
-            known.emission,
-            known.emission_stderr,
-        ] {
-            row.extend(color.to_array().map(Cell::from));
-        }
-        row.extend([
-            known.roughness.into(),
-            known.specular.into(),
-            known.seen_pixels.into(),
-            (object.triangles.len() as u64).into(),
-            object.area.into(),
-            known.identifiable.to_string().as_str().into(),
-            known.albedo_identifiable.to_string().as_str().into(),
-            known.note.as_str().into(),
-        ]);
-        table.row(&row);
+        table.row((
+            &object.name,
+            [known.albedo, known.albedo_stderr],
+            [known.emission, known.emission_stderr],
+            known.roughness,
+            known.specular,
+            known.seen_pixels,
+            object.triangles.len(),
+            object.area,
+            known.identifiable,
+            known.albedo_identifiable,
+            &known.note,
+        ));
     }
     table
 }

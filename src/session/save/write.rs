@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::export::overwrite::{CHECKPOINT, ESTIMATE, REPORT};
 use crate::export::plot::loss_plot;
 use crate::export::scene::{self, Format};
-use crate::export::table::{Cell, Table};
+use crate::export::table::Table;
 use crate::inverse::solver::Progress;
 use crate::session::save::estimate::{CheckpointFile, EstimateFile};
 use crate::session::save::pictures;
@@ -133,22 +133,24 @@ pub fn write_checkpoint(folder: &Path, results: &Results) -> Result<()> {
 /// each iteration the relative residual of the fit, the relative error that the estimate reports, and the number of unknowns.
 fn losses(progress: &Progress) -> Table {
     let mut table = Table::new("seconds,iteration,train,held_out,residual,stderr,unknowns");
-    use Cell::Empty;
-    let measured = progress.losses.iter().map(|p| {
-        let values = [p.train.into(), p.held_out.into(), Empty, Empty, Empty];
+    // Residual, standard error and unknowns stay empty beside losses, and losses beside these.
+    let losses = progress.losses.iter().map(|p| {
+        let values = (Some(p.train), p.held_out, None, None, None);
         (p.seconds, p.iteration, values)
     });
-    let fitted = progress.fits.iter().map(|p| {
-        let (residual, stderr) = (p.residual.into(), p.stderr.into());
-        let values = [Empty, Empty, residual, stderr, p.unknowns.into()];
+    let fits = progress.fits.iter().map(|p| {
+        let values = (
+            None,
+            None,
+            Some(p.residual),
+            Some(p.stderr),
+            Some(p.unknowns),
+        );
         (p.seconds, p.iteration, values)
     });
-    let mut rows: Vec<(f64, u64, [Cell; 5])> = measured.chain(fitted).collect();
+    let mut rows: Vec<_> = losses.chain(fits).collect();
     rows.sort_by(|a, b| a.0.total_cmp(&b.0));
-    for (seconds, iteration, values) in rows {
-        let time: [Cell; 2] = [seconds.into(), iteration.into()];
-        table.row(&[&time[..], &values].concat());
-    }
+    rows.into_iter().for_each(|row| table.row(row));
     table
 }
 

@@ -205,17 +205,17 @@ pub fn table(axis: &str, kinds: &[Kind], cache: &[Mark]) -> Table {
     let columns = "seed,mark,rays,seconds,steps,loss,albedo_error,emission_error";
     let mut table = Table::new(&format!("{axis},{columns}"));
     let mut add = |name: &str, seed: usize, mark: &Mark| {
-        table.row(&[
-            name.into(),
-            (seed as u64).into(),
-            mark.index.map(u64::from).into(),
-            mark.rays.into(),
-            mark.seconds.into(),
-            mark.steps.into(),
-            mark.errors.loss.into(),
-            mark.errors.albedo.into(),
-            mark.errors.emission.into(),
-        ]);
+        table.row((
+            name,
+            seed,
+            mark.index,
+            mark.rays,
+            mark.seconds,
+            mark.steps,
+            mark.errors.loss,
+            mark.errors.albedo,
+            mark.errors.emission,
+        ));
     };
     for kind in kinds {
         for (seed, course) in (1..).zip(&kind.courses) {

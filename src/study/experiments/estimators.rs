@@ -138,14 +138,14 @@ fn run(bench: &Bench) -> Result<Findings> {
         for at in &fits {
             for (seed, scales) in (1u64..).zip(&at.scales) {
                 for (index, (estimator, _)) in ESTIMATORS.iter().enumerate() {
-                    table.row(&[
-                        name.into(),
-                        (*estimator).into(),
-                        u64::from(at.samples).into(),
-                        seed.into(),
-                        scales[index].into(),
-                        (index == 2).then_some(at.predicted).into(),
-                    ]);
+                    table.row((
+                        name,
+                        (*estimator),
+                        u64::from(at.samples),
+                        seed,
+                        scales[index],
+                        (index == 2).then_some(at.predicted),
+                    ));
                 }
             }
             let [a, b, c, d] = [0, 1, 2, 3].map(|estimator| at.value(estimator));

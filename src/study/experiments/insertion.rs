@@ -220,15 +220,15 @@ fn table(scenes: &[Scene]) -> Table {
     for scene in scenes {
         for (way, places) in WAYS.iter().zip(&scene.likeness) {
             for (place, likeness) in PLACES.iter().zip(places) {
-                table.row(&[
-                    scene.name.as_str().into(),
-                    (*way).into(),
-                    (*place).into(),
-                    likeness.pixels().into(),
-                    likeness.relative().into(),
-                    likeness.psnr().into(),
-                    likeness.ssim().into(),
-                ]);
+                table.row((
+                    scene.name.as_str(),
+                    (*way),
+                    (*place),
+                    likeness.pixels(),
+                    likeness.relative(),
+                    likeness.psnr(),
+                    likeness.ssim(),
+                ));
             }
         }
     }

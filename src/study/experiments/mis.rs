@@ -190,13 +190,13 @@ fn variances(scenes: &[LitRoom]) -> Table {
     let mut table = Table::new("scene,sampling,variance,standard_error,rays_per_path");
     for scene in scenes {
         for ((sampling, _), noise) in SAMPLINGS.iter().zip(&scene.noises) {
-            table.row(&[
-                scene.name.as_str().into(),
-                sampling.word().into(),
-                noise.variance.into(),
-                noise.error.into(),
-                noise.rays.into(),
-            ]);
+            table.row((
+                scene.name.as_str(),
+                sampling.word(),
+                noise.variance,
+                noise.error,
+                noise.rays,
+            ));
         }
     }
     table

@@ -240,12 +240,7 @@ fn findings(words: &str, noise: f64, lines: &[Line]) -> Findings {
     let mut table = Table::new("axis,quantity,value,relative_error");
     for line in lines {
         for &(value, error) in &line.points {
-            table.row(&[
-                line.axis.into(),
-                line.quantity.into(),
-                value.into(),
-                error.into(),
-            ]);
+            table.row((line.axis, line.quantity, value, error));
         }
     }
     let row = |line: &Line| {

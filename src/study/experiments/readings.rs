@@ -111,13 +111,13 @@ fn run(bench: &Bench) -> Result<Findings> {
         rows: Vec::new(),
     };
     let mut row = |capture: &Capture, name: &str, outcome: &Outcome| {
-        table.row(&[
-            capture.name.as_str().into(),
-            name.into(),
-            outcome.alignment.agreement.into(),
-            u64::from(outcome.detected).into(),
-            u64::from(outcome.right_remedy).into(),
-        ]);
+        table.row((
+            capture.name.as_str(),
+            name,
+            outcome.alignment.agreement,
+            u64::from(outcome.detected),
+            u64::from(outcome.right_remedy),
+        ));
     };
 
     // Correct captures: the given one, or the built-in room and rooms of all families.

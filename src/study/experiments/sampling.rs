@@ -137,7 +137,7 @@ fn descent(
 fn of_paths(evenness: &[Evenness]) -> Table {
     let mut table = Table::new("paths,random,low_discrepancy");
     for at in evenness {
-        table.row(&[at.paths.into(), at.random.into(), at.sequence.into()]);
+        table.row((at.paths, at.random, at.sequence));
     }
     table
 }

@@ -169,18 +169,18 @@ fn table(all: &[Solved]) -> Table {
     for solved in all {
         for (solver, marks) in solved.by_solver() {
             for (seed, mark) in (1u64..).zip(marks) {
-                table.row(&[
-                    solved.posed.object.as_str().into(),
-                    solver.into(),
-                    seed.into(),
-                    mark.errors.object.into(),
-                    mark.errors.albedo.into(),
-                    mark.errors.emission.into(),
-                    mark.errors.loss.into(),
-                    mark.rays.into(),
-                    mark.seconds.into(),
-                    solved.posed.floor.into(),
-                ]);
+                table.row((
+                    solved.posed.object.as_str(),
+                    solver,
+                    seed,
+                    mark.errors.object,
+                    mark.errors.albedo,
+                    mark.errors.emission,
+                    mark.errors.loss,
+                    mark.rays,
+                    mark.seconds,
+                    solved.posed.floor,
+                ));
             }
         }
     }

@@ -255,14 +255,14 @@ fn findings(how: String, states: Vec<State>, truth: Option<Vec<Picture>>) -> Fin
         value.map_or("-".to_owned(), |value| format!("{}{unit}", brief(value)))
     };
     for state in &states {
-        table.row(&[
-            state.name.as_str().into(),
-            (state.unknowns as u64).into(),
-            state.psnr.into(),
-            state.loss.into(),
-            state.seconds.into(),
-            state.rays.into(),
-        ]);
+        table.row((
+            state.name.as_str(),
+            (state.unknowns as u64),
+            state.psnr,
+            state.loss,
+            state.seconds,
+            state.rays,
+        ));
         rows.push(vec![
             state.name.clone(),
             state.unknowns.to_string(),

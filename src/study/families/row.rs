@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::export::atomic::write_bytes;
+use crate::export::table::line;
 use crate::room::generated::Family;
 use crate::study::families::Plan;
 use serde::de::DeserializeOwned;
@@ -102,7 +103,7 @@ impl<R: RoomRow> Rows<R> {
             .map(|(index, row)| row.map_err(|_| another(index + 2)))
             .collect::<Result<_>>()?;
         let header = match rows.first() {
-            Some(row) => lines(row, true).map_err(io)?,
+            Some(row) => line(row, true).map_err(io)?,
             None => Vec::new(),
         };
         let first = text.split_inclusive('\n').next().unwrap_or_default();
@@ -150,19 +151,10 @@ impl<R: RoomRow> Rows<R> {
             .open(&self.path)
             .map_err(io)?;
         let is_new = file.metadata().map_err(io)?.len() == 0;
-        let bytes = lines(&row, is_new).map_err(io)?;
+        let bytes = line(&row, is_new).map_err(io)?;
         file.write_all(&bytes).map_err(io)?;
         file.sync_data().map_err(io)?;
         self.rows.push(row);
         Ok(())
     }
-}
-
-/// A row as a line, after the names of its columns if asked for.
-fn lines<R: Serialize>(row: &R, header: bool) -> std::io::Result<Vec<u8>> {
-    let mut lines = csv::WriterBuilder::new()
-        .has_headers(header)
-        .from_writer(Vec::new());
-    lines.serialize(row)?;
-    lines.into_inner().map_err(csv::IntoInnerError::into_error)
 }

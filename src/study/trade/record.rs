@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::export::atomic::write_bytes;
-use crate::export::table::{Cell, Table};
+use crate::export::table::Table;
 use crate::study::machine::Machine;
 use crate::study::trade::curve::{Curve, Measure, Point};
 use crate::study::trade::{compare, plot};
@@ -110,28 +110,24 @@ impl Trade {
         let mut table = Table::new(COLUMNS);
         for curve in &self.curves {
             for point in &curve.points {
-                table.row(&self.row(curve, point));
+                table.row((
+                    &curve.name,
+                    curve.settings.preset.word(),
+                    point.seconds,
+                    point.error,
+                    point.spread.map(|s| s[0]),
+                    point.spread.map(|s| s[1]),
+                    point.reported,
+                    point.rays,
+                    point.iterations,
+                    u8::from(point.pareto),
+                    self.measure.label(),
+                    self.machine.threads,
+                    &self.machine.cpu,
+                ));
             }
         }
         table
-    }
-
-    fn row(&self, curve: &Curve, point: &Point) -> [Cell; 13] {
-        [
-            curve.name.as_str().into(),
-            curve.settings.preset.word().into(),
-            point.seconds.into(),
-            point.error.into(),
-            point.spread.map(|s| s[0]).into(),
-            point.spread.map(|s| s[1]).into(),
-            point.reported.into(),
-            point.rays.into(),
-            point.iterations.into(),
-            u64::from(point.pareto).into(),
-            self.measure.label().into(),
-            (self.machine.threads as u64).into(),
-            self.machine.cpu.as_str().into(),
-        ]
     }
 
     /// A table of the first and last point of each solve, then the conclusions.
