@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::export::canvas::{DrawError, FONT, PlotArea, write_plot};
 use crate::export::scale::Scale;
-use crate::inverse::solver::{FitPoint, LossPoint, Stage};
+use crate::inverse::solver::{FitPoint, LossPoint, Stage, with_ends};
 use plotters::prelude::{
     BLACK, ChartBuilder, Circle, Color, EmptyElement, IntoFont, LineSeries, PathElement, Polygon,
     RGBColor, Rectangle, SeriesLabelPosition, Text, WHITE,
@@ -245,11 +245,7 @@ pub fn loss_plot(losses: &[LossPoint], fits: &[FitPoint], stages: &[Stage]) -> P
         let points = losses.iter();
         Series::line(name, points.filter_map(|p| Some([p.seconds, value(p)?])))
     };
-    let mut start = 0.0;
-    let mark = |stage: &Stage| {
-        start += stage.seconds;
-        (start - stage.seconds, stage.name.clone())
-    };
+    let mark = |(end, stage): (f64, &Stage)| (end - stage.seconds, stage.name.clone());
     let residuals = fits.iter().map(|p| [p.seconds, p.residual]);
     let series = [
         curve("in the fit", |p| p.train),
@@ -261,7 +257,7 @@ pub fn loss_plot(losses: &[LossPoint], fits: &[FitPoint], stages: &[Stage]) -> P
         x: Axis::linear("seconds"),
         y: Axis::logarithmic("mean absolute difference, radiance; residual, relative"),
         series: (series.into_iter().filter(|s| !s.points.is_empty())).collect(),
-        marks: stages.iter().map(mark).collect(),
+        marks: with_ends(stages).map(mark).collect(),
         labels: Vec::new(),
     }
 }

@@ -83,6 +83,14 @@ pub struct Stage {
     pub why: String,
 }
 
+/// Stages, each with the seconds from the start to its end.
+pub fn with_ends(stages: &[Stage]) -> impl Iterator<Item = (f64, &Stage)> {
+    stages.iter().scan(0.0, |end, stage| {
+        *end += stage.seconds;
+        Some((*end, stage))
+    })
+}
+
 /// The observer's answer to a report.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Control {

@@ -2,7 +2,7 @@
 
 use crate::app::panels::plot::{at, decades, hovered, legend};
 use crate::app::theme;
-use crate::inverse::solver::{LossPoint, Progress, Stage};
+use crate::inverse::solver::{LossPoint, Progress, Stage, with_ends};
 use egui::Ui;
 use egui_plot::{Line, LineStyle, Plot, PlotPoints, Points, VLine};
 
@@ -36,9 +36,7 @@ pub fn pane(ui: &mut Ui, progress: &Progress) {
         .y_grid_spacer(decades)
         .y_axis_min_width(36.0)
         .show(ui, |plot| {
-            let mut end = 0.0;
-            for stage in &progress.stages {
-                end += stage.seconds;
+            for (end, _) in with_ends(&progress.stages) {
                 // Without a name it stays out of the legend.
                 let line = VLine::new("", end).color(tokens.outline);
                 plot.vline(line.style(LineStyle::dashed_loose()));
@@ -61,11 +59,8 @@ pub fn pane(ui: &mut Ui, progress: &Progress) {
 
 /// The stage at a time since the start; `None` after the last that has ended.
 fn stage_at(stages: &[Stage], seconds: f64) -> Option<&str> {
-    let mut end = 0.0;
-    let stage = stages.iter().find(|stage| {
-        end += stage.seconds;
-        seconds <= end
-    })?;
+    let mut stages = with_ends(stages);
+    let (_, stage) = stages.find(|(end, _)| seconds <= *end)?;
     Some(&stage.name)
 }
 
