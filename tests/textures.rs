@@ -12,7 +12,7 @@ use relit::inverse::estimate::{Estimate, ObjectEstimate};
 use relit::inverse::settings::Settings;
 use relit::inverse::solve;
 use relit::inverse::solver::{Control, Observer, Progress, Termination};
-use relit::inverse::texture::{Refined, Task, refine};
+use relit::inverse::texture::{Refined, Step, Task, refine};
 use relit::transport::material::{Albedo, Material, Texture};
 use std::sync::{Arc, LazyLock};
 
@@ -87,7 +87,7 @@ fn refined(problem: &Problem, estimate: &Estimate, objects: &[usize], paths: u64
         usize::MAX,
     );
     let task = task(problem, &gbuffer, paths);
-    let (refined, ended) = refine(&task, estimate, objects, &|_| None, &mut |_, _, _| Ok(()));
+    let (refined, ended) = refine(&task, estimate, objects, &|_| None, &mut |_, _| Ok(()));
     ended.expect("nobody ends it");
     refined
 }
@@ -278,6 +278,28 @@ fn threads_do_not_change_a_bit() {
     assert_eq!((&a.stderr, &a.seen), (&b.stderr, &b.seen));
 }
 
+/// Weaker smoothing shows more of the poster, which the residuals tell while it is fitted.
+#[test]
+fn residuals_fall_while_the_poster_is_fitted() {
+    let gbuffer = GBuffer::new(
+        &ROOM.problem,
+        HoldOut::from(&*SETTINGS),
+        SETTINGS.seed,
+        usize::MAX,
+    );
+    let task = task(&ROOM.problem, &gbuffer, 10_000);
+    let mut residuals = Vec::new();
+    let mut report = |step: Step, _| {
+        residuals.extend(step.residual);
+        Ok(())
+    };
+    let (_, ended) = refine(&task, &ROOM.estimate, &[BACK], &|_| None, &mut report);
+    ended.expect("nobody ends it");
+    println!("{residuals:?}");
+    let least = residuals.iter().copied().fold(f64::INFINITY, f64::min);
+    assert!(least > 0.0 && least < 0.7 * residuals[0], "{residuals:?}");
+}
+
 #[test]
 fn who_ends_it_is_obeyed() {
     let gbuffer = GBuffer::new(
@@ -289,7 +311,7 @@ fn who_ends_it_is_obeyed() {
     let task = task(&ROOM.problem, &gbuffer, 10_000);
     let ended_after = |most: u32| {
         let mut calls = 0;
-        refine(&task, &ROOM.estimate, &[BACK], &|_| None, &mut |_, _, _| {
+        refine(&task, &ROOM.estimate, &[BACK], &|_| None, &mut |_, _| {
             calls += 1;
             if calls > most {
                 Err(Termination::Cancelled)
@@ -319,7 +341,7 @@ fn states_that_held_out_pixels_speak_against_are_not_kept() {
     );
     let task = task(&ROOM.problem, &gbuffer, 10_000);
     let judged = |judge: &dyn Fn(&Estimate) -> Option<f64>| {
-        let (refined, ended) = refine(&task, &ROOM.estimate, &[BACK], judge, &mut |_, _, _| Ok(()));
+        let (refined, ended) = refine(&task, &ROOM.estimate, &[BACK], judge, &mut |_, _| Ok(()));
         ended.expect("nobody ends it");
         refined
     };

@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::export::canvas::{DrawError, FONT, PlotArea, write_plot};
 use crate::export::scale::Scale;
-use crate::inverse::solver::{FitPoint, LossPoint, Stage, with_ends};
+use crate::inverse::solver::{LossPoint, Progress, Stage, with_ends};
 use plotters::prelude::{
     BLACK, ChartBuilder, Circle, Color, EmptyElement, IntoFont, LineSeries, PathElement, Polygon,
     RGBColor, Rectangle, SeriesLabelPosition, Text, WHITE,
@@ -239,25 +239,27 @@ fn steps(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     points.first().copied().into_iter().chain(turns).collect()
 }
 
-/// Loss of a solve over seconds, in the fit and on held-out pixels, and the fit's relative residual, with the stages marked.
-pub fn loss_plot(losses: &[LossPoint], fits: &[FitPoint], stages: &[Stage]) -> Plot {
+/// Loss of a solve over seconds, in the fit and on held-out pixels, and relative residuals of the fit and of textures, with the stages marked.
+pub fn loss_plot(progress: &Progress) -> Plot {
     let curve = |name: &str, value: fn(&LossPoint) -> Option<f64>| {
-        let points = losses.iter();
+        let points = progress.losses.iter();
         Series::line(name, points.filter_map(|p| Some([p.seconds, value(p)?])))
     };
     let mark = |(end, stage): (f64, &Stage)| (end - stage.seconds, stage.name.clone());
-    let residuals = fits.iter().map(|p| [p.seconds, p.residual]);
+    let residuals = progress.fits.iter().map(|p| [p.seconds, p.residual]);
+    let textures = progress.textures.iter().map(|p| [p.seconds, p.residual]);
     let series = [
         curve("in the fit", |p| p.train),
         curve("held out", |p| p.held_out),
         Series::line("residual, relative", residuals),
+        Series::line("textures one by one, relative", textures),
     ];
     Plot {
         title: "Loss".to_owned(),
         x: Axis::linear("seconds"),
-        y: Axis::logarithmic("mean absolute difference, radiance; residual, relative"),
+        y: Axis::logarithmic("mean absolute difference, radiance; residuals, relative"),
         series: (series.into_iter().filter(|s| !s.points.is_empty())).collect(),
-        marks: with_ends(stages).map(mark).collect(),
+        marks: with_ends(&progress.stages).map(mark).collect(),
         labels: Vec::new(),
     }
 }
@@ -350,7 +352,10 @@ mod tests {
             held_out,
         };
         let losses = [point(0, Some(1.0)), point(1, None), point(2, Some(0.5))];
-        let plot = loss_plot(&losses, &[], &[]);
+        let plot = loss_plot(&Progress {
+            losses: losses.to_vec(),
+            ..Progress::default()
+        });
         assert_eq!(plot.series[0].points.len(), 3);
         assert_eq!(plot.series[1].points, [[0.0, 1.0], [2.0, 0.5]]);
         let image = draw(&plot);

@@ -4,7 +4,7 @@ use crate::inverse::estimate::Estimate;
 use crate::inverse::known::Known;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{
-    Checkpoint, Control, FitPoint, LossPoint, Observer, Progress, Termination,
+    Checkpoint, Control, FitPoint, LossPoint, Observer, Progress, Termination, TexturePoint,
 };
 use crate::transport::arrival::RayCount;
 use std::time::{Duration, Instant};
@@ -27,6 +27,8 @@ pub struct Monitor<'a> {
 }
 
 const REPORT_EVERY: Duration = Duration::from_millis(30);
+/// Least seconds between points of the curve of textures, so that a thousand objects leave some hundred.
+const TEXTURE_EVERY: f64 = 0.25;
 
 impl<'a> Monitor<'a> {
     /// Starts the clock at the seconds in `progress`.
@@ -135,6 +137,20 @@ impl<'a> Monitor<'a> {
             unknowns: unknowns as u64,
         };
         self.progress.fits.push(point);
+    }
+
+    /// Adds a point to the curve of textures, unless the last one is new.
+    pub fn texture(&mut self, residual: f64) {
+        let seconds = self.seconds();
+        let last = self.progress.textures.last();
+        if last.is_none_or(|last| seconds - last.seconds >= TEXTURE_EVERY) {
+            let iteration = self.progress.iterations;
+            self.progress.textures.push(TexturePoint {
+                seconds,
+                iteration,
+                residual,
+            });
+        }
     }
 
     /// Counts rays cast, and paths rejected because their weights were not finite.

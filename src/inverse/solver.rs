@@ -28,6 +28,9 @@ pub struct Progress {
     /// The residual of the fit after each iteration; empty for the paper's descent.
     #[serde(default)]
     pub fits: Vec<FitPoint>,
+    /// Residuals of textures, one object after the other.
+    #[serde(default)]
+    pub textures: Vec<TexturePoint>,
     /// Finished stages of the pipeline.
     pub stages: Vec<Stage>,
     /// Number of rejected samples, by cause.
@@ -62,6 +65,17 @@ pub struct FitPoint {
     pub stderr: Option<f64>,
     /// Number of free parameters.
     pub unknowns: u64,
+}
+
+/// The fit of an object's texture.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TexturePoint {
+    /// Seconds of solving.
+    pub seconds: f64,
+    /// Iterations.
+    pub iteration: u64,
+    /// Root mean square residual of the object's cross-validated pixels, in units of its mean albedo.
+    pub residual: f64,
 }
 
 /// A finished stage of the pipeline.

@@ -58,7 +58,14 @@ fn a_solve_writes_everything_and_all_of_it_can_be_read() {
         .collect();
     assert_eq!(
         rows[0][2..],
-        ["train", "held_out", "residual", "stderr", "unknowns"]
+        [
+            "train",
+            "held_out",
+            "residual",
+            "stderr",
+            "unknowns",
+            "texture_residual"
+        ]
     );
     let told = |column: usize| {
         rows[1..]

@@ -19,6 +19,8 @@ pub fn pane(ui: &mut Ui, progress: &Progress) {
     let held_out = curve(&progress.losses, |point| point.held_out);
     let fits = progress.fits.iter();
     let fits = logarithmic(fits.map(|point| [point.seconds, point.residual]));
+    let textures = progress.textures.iter();
+    let textures = logarithmic(textures.map(|point| [point.seconds, point.residual]));
     Plot::new("loss")
         .legend(legend())
         .y_axis_formatter(|mark, _| at(mark.value))
@@ -53,6 +55,10 @@ pub fn pane(ui: &mut Ui, progress: &Progress) {
                     let line = Line::new(name, PlotPoints::from(points));
                     plot.line(line.color(color).width(1.8));
                 }
+            }
+            if !textures.is_empty() {
+                let points = Points::new("Textures one by one, relative", textures);
+                plot.points(points.color(tokens.weak).radius(1.5));
             }
         });
 }

@@ -96,17 +96,14 @@ impl Pipeline<'_, '_> {
             loss
         };
         let (monitor, estimate, checkpoint) = (&mut self.monitor, &self.estimate, &self.checkpoint);
-        let (refined, ended) = refine(
-            &task,
-            estimate,
-            &objects,
-            &judge,
-            &mut |rays, rejected, fraction| {
-                monitor.cast(RayCount { rays, rejected });
-                monitor.progress.fraction = Some(fraction as f32);
-                monitor.tick(estimate, &|_| checkpoint.clone())
-            },
-        );
+        let (refined, ended) = refine(&task, estimate, &objects, &judge, &mut |step, fraction| {
+            monitor.cast(step.cast);
+            if let Some(residual) = step.residual {
+                monitor.texture(residual);
+            }
+            monitor.progress.fraction = Some(fraction as f32);
+            monitor.tick(estimate, &|_| checkpoint.clone())
+        });
         self.monitor.cast(judged.get());
         let mut why = refined.summary(|k| self.problem.scene.objects[k].name.clone());
         if ended.is_err() {

@@ -134,7 +134,8 @@ impl Measurements {
 
     /// Fits the cells with the smoothing that predicts cross-validated pixels best, with at least `min_folds` folds. Lower bounds
     /// that the fit meets lose their weight. `known` is the strength that an earlier fit of the same cells chose: the search
-    /// begins [`MARGIN`] times as strong. `between` is called after each strength of smoothing.
+    /// begins [`MARGIN`] times as strong. `between` is called after each strength of smoothing, with the root mean square
+    /// residual of cross-validated pixels, in units of the mean albedo.
     ///
     /// # Errors
     /// The error of `between`.
@@ -143,7 +144,7 @@ impl Measurements {
         links: &Links,
         min_folds: usize,
         known: Option<f32>,
-        mut between: impl FnMut() -> Result<(), E>,
+        mut between: impl FnMut(f64) -> Result<(), E>,
     ) -> Result<Texture, E> {
         let unit = self.unit();
         let values: Vec<Vec3> = self.albedo.iter().map(|a| *a / unit).collect();
@@ -192,7 +193,7 @@ impl Measurements {
                 worse += 1;
             }
             strength *= FACTOR;
-            between()?;
+            between((score / 3.0).sqrt())?;
         }
 
         let (score, strength, without) = best;
@@ -406,7 +407,7 @@ mod tests {
         };
         let observations = Observations::new(rows, cells);
         let mut measurements = Measurements::new(&seen, observations, &vec![Vec3::ONE; cells]);
-        let texture = measurements.fit(&links, 1, None, || Ok::<_, ()>(()));
+        let texture = measurements.fit(&links, 1, None, |_| Ok::<_, ()>(()));
         texture.expect("nothing ends it").colors
     }
 

@@ -10,6 +10,7 @@ use crate::math::color::luminance;
 use crate::math::rng::Stream;
 use crate::math::warp;
 use crate::scene::geometry::Hit;
+use crate::transport::arrival::RayCount;
 use crate::transport::lit::LitScene;
 use crate::transport::path::PathOptions;
 use glam::{DVec3, Vec3};
@@ -35,10 +36,8 @@ const PATIENCE: u32 = 2;
 pub struct Irradiance {
     /// One value per cell in each set.
     pub sets: [Vec<Vec3>; 2],
-    /// Number of rays cast.
-    pub rays: u64,
-    /// Number of paths rejected because they were not finite.
-    pub rejected: u64,
+    /// Rays cast, and paths rejected because they were not finite.
+    pub cast: RayCount,
 }
 
 /// The points of each cell that pixels see.
@@ -92,10 +91,10 @@ pub fn trace(
     options: &PathOptions,
     [seed, key]: [u64; 2],
 ) -> Irradiance {
-    let traced: Vec<([Vec3; 2], u64, u64)> = range
+    let traced: Vec<([Vec3; 2], RayCount)> = range
         .into_par_iter()
         .map(|cell| {
-            let (mut rays, mut rejected) = (0, 0);
+            let mut cast = RayCount::default();
             let sets = [0, 1].map(|set| {
                 let mut sum = DVec3::ZERO;
                 for sample in 0..samples {
@@ -103,23 +102,21 @@ pub fn trace(
                     let mut stream = Stream::new(seed, key, cell as u64, index);
                     let (hit, normal) = point_on(lit, cells, seen, cell, &mut stream);
                     let surface = lit.surface(&hit);
-                    let (light, cast) = white_base(lit, &surface, normal, &mut stream, options);
+                    let (light, path) = white_base(lit, &surface, normal, &mut stream, options);
                     sum += light.as_dvec3();
-                    rays += cast.rays;
-                    rejected += cast.rejected;
+                    cast += path;
                 }
                 (sum / f64::from(samples.max(1))).as_vec3()
             });
-            (sets, rays, rejected)
+            (sets, cast)
         })
         .collect();
     let mut irradiance = Irradiance::default();
-    for (sets, rays, rejected) in traced {
+    for (sets, cast) in traced {
         for (all, value) in irradiance.sets.iter_mut().zip(sets) {
             all.push(value);
         }
-        irradiance.rays += rays;
-        irradiance.rejected += rejected;
+        irradiance.cast += cast;
     }
     irradiance
 }
@@ -177,8 +174,7 @@ impl Irradiance {
         for (all, more) in self.sets.iter_mut().zip(other.sets) {
             all.extend(more);
         }
-        self.rays += other.rays;
-        self.rejected += other.rejected;
+        self.cast += other.cast;
     }
 
     /// Smooths with the strength at which each set predicts the other best. `between` is called after each strength.

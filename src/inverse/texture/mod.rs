@@ -25,6 +25,7 @@ use crate::calibrate::sharpness::Sharpness;
 use crate::inverse::estimate::{Estimate, TexelEstimate};
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::Termination;
+use crate::transport::arrival::RayCount;
 use crate::transport::path::PathOptions;
 use glam::Vec3;
 use std::sync::Arc;
@@ -160,8 +161,33 @@ impl Refined {
     }
 }
 
-/// Receives rays cast, paths rejected and the fraction of the work that is done; its error ends the stage.
-pub type Report<'t> = dyn FnMut(u64, u64, f64) -> Result<(), Termination> + 't;
+/// A step of the stage.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Step {
+    /// Rays cast, and paths rejected because they were not finite.
+    pub cast: RayCount,
+    /// After a fit: root mean square residual of an object's cross-validated pixels, in units of its mean albedo.
+    pub residual: Option<f64>,
+}
+
+impl Step {
+    fn cast(cast: RayCount) -> Self {
+        Self {
+            cast,
+            residual: None,
+        }
+    }
+
+    fn residual(residual: f64) -> Self {
+        Self {
+            residual: Some(residual),
+            ..Self::default()
+        }
+    }
+}
+
+/// Receives steps and the fraction of the work that is done; its error ends the stage.
+pub type Report<'t> = dyn FnMut(Step, f64) -> Result<(), Termination> + 't;
 
 /// Tries a texture on each of the given objects, keeps those that improve held-out pixels, and then alternates between light and
 /// textures. `judge` is the loss of an estimate on held-out pixels: a sweep that makes it worse is undone. If `report` ends the
@@ -252,8 +278,8 @@ impl Refinement<'_> {
             let paths =
                 self.task.paths as f64 * COARSE_PATHS * (pixels.len() as f64).sqrt() / total;
             let fraction = index as f64 / candidates.len() as f64 * 0.6;
-            let mut done = |rays, rejected| report(rays, rejected, fraction);
-            done(0, 0)?;
+            let mut done = |step| report(step, fraction);
+            done(Step::default())?;
             let glossy = self.estimate.objects[*object].lobe().is_some();
             let Some(mut coarse) =
                 TexturedSurface::new(self.task, *object, glossy, pixels, COARSE_WIDTH)
@@ -301,7 +327,7 @@ impl Refinement<'_> {
         for (index, surface) in self.kept.iter_mut().enumerate() {
             let paths = self.task.paths as f64 * (surface.pixel_count() as f64).sqrt() / total;
             let fraction = (f64::from(sweep - 1) + index as f64 / count as f64) / f64::from(SWEEPS);
-            let mut done = |rays, rejected| report(rays, rejected, 0.6 + 0.4 * fraction);
+            let mut done = |step| report(step, 0.6 + 0.4 * fraction);
             let before = surface.mean();
             let known = &self.estimate.objects[surface.object];
             let scale_error = known.albedo_stderr / known.albedo.max(Vec3::splat(1e-3));

@@ -2,7 +2,6 @@
 
 use crate::calibrate::gbuffer::GBufferPixel;
 use crate::inverse::solver::Termination;
-use crate::inverse::texture::Task;
 use crate::inverse::texture::cells::Cells;
 use crate::inverse::texture::errors::{standard_errors, with_light};
 use crate::inverse::texture::fit::{Measurements, Texture};
@@ -12,6 +11,7 @@ use crate::inverse::texture::links::Links;
 use crate::inverse::texture::look::{FOLDS, RAYS, SeenPixel, sample_pixels};
 use crate::inverse::texture::observations::Observations;
 use crate::inverse::texture::trial::{TestPixel, Trial, compare};
+use crate::inverse::texture::{Step, Task};
 use crate::scene::Scene;
 use crate::transport::lit::LitScene;
 use crate::transport::path::PathOptions;
@@ -54,8 +54,8 @@ pub struct TexturedSurface {
     pub stderr: Vec<Vec3>,
 }
 
-/// Receives rays cast and paths rejected; its error ends the stage.
-type Done<'d> = dyn FnMut(u64, u64) -> Result<(), Termination> + 'd;
+/// Receives what was done; its error ends the stage.
+type Done<'d> = dyn FnMut(Step) -> Result<(), Termination> + 'd;
 
 impl TexturedSurface {
     /// Cuts the object into cells, `width` times as wide as the footprints of its pixels; `None` if no usable pixel sees only this
@@ -154,17 +154,17 @@ impl TexturedSurface {
                 options,
                 [self.seed, key],
             );
-            done(part.rays, part.rejected)?;
+            done(Step::cast(part.cast))?;
             irradiance.append(part);
         }
-        let light = irradiance.smoothed(&self.links, || done(0, 0))?;
-        done(0, 0)?;
+        let light = irradiance.smoothed(&self.links, || done(Step::default()))?;
+        done(Step::default())?;
         if self.glossy {
             let samples = paths / (GLOSS_COST * self.pixels.len() as u64);
             let samples = samples.clamp(MIN_GLOSS, MAX_SAMPLES) as u32;
             for pixels in self.pixels.chunks_mut(SLICE) {
                 let cast = trace_gloss(lit, pixels, samples, options, self.seed, key);
-                done(cast.rays, cast.rejected)?;
+                done(Step::cast(cast))?;
             }
         }
         let observations = Observations::new(&self.rows(), self.cells.count());
@@ -174,9 +174,11 @@ impl TexturedSurface {
         let decides = self.glossy && sweep == 0;
         let min_folds = if decides { FOLDS } else { 1 };
         let known = self.texture.strength;
-        self.texture = measurements.fit(&self.links, min_folds, known, || done(0, 0))?;
+        self.texture = measurements.fit(&self.links, min_folds, known, |residual| {
+            done(Step::residual(residual))
+        })?;
         self.constant = measurements.constant;
-        done(0, 0)?;
+        done(Step::default())?;
         if let Some(scale_error) = errors {
             let errors = standard_errors(
                 &measurements,
@@ -189,7 +191,7 @@ impl TexturedSurface {
                 (scale_error * scale_error + Vec3::splat(light.noise * light.noise)).powf(0.5);
             self.stderr = with_light(&errors, &self.texture, light);
         }
-        done(0, 0)
+        done(Step::default())
     }
 
     /// Compares the texture with one colour on pixels outside the fit.
@@ -222,7 +224,7 @@ impl TexturedSurface {
             options,
             self.seed,
         );
-        done(trial.cast.rays, trial.cast.rejected)?;
+        done(Step::cast(trial.cast))?;
         Ok(trial)
     }
 

@@ -39,7 +39,7 @@ pub fn write(folder: &Path, results: &Results) -> Result<()> {
 
     write_shown(folder, results, |staging| {
         let progress = &results.progress;
-        let plot = loss_plot(&progress.losses, &progress.fits, &progress.stages);
+        let plot = loss_plot(progress);
         plot.write(&staging.file("loss.png")?)?;
         staging.write(REPORT, &report()?)
     })
@@ -129,27 +129,48 @@ pub fn write_checkpoint(folder: &Path, results: &Results) -> Result<()> {
     })
 }
 
-/// The course of a solve as a table, in order of time: losses in the fit and on held-out pixels where they were measured, and after
-/// each iteration the relative residual of the fit, the relative error that the estimate reports, and the number of unknowns.
+/// A row of loss.csv.
+#[derive(Default, Serialize)]
+struct LossRow {
+    seconds: f64,
+    iteration: u64,
+    train: Option<f64>,
+    held_out: Option<f64>,
+    residual: Option<f64>,
+    stderr: Option<f64>,
+    unknowns: Option<u64>,
+    texture_residual: Option<f64>,
+}
+
+/// The course of a solve as a table, in order of time: losses in the fit and on held-out pixels where they were measured, after
+/// each iteration the relative residual of the fit, the relative error that the estimate reports, and the number of unknowns, and
+/// the relative residuals of textures.
 fn losses(progress: &Progress) -> Table {
-    let mut table = Table::new("seconds,iteration,train,held_out,residual,stderr,unknowns");
-    // Residual, standard error and unknowns stay empty beside losses, and losses beside these.
-    let losses = progress.losses.iter().map(|p| {
-        let values = (Some(p.train), p.held_out, None, None, None);
-        (p.seconds, p.iteration, values)
+    let mut table =
+        Table::new("seconds,iteration,train,held_out,residual,stderr,unknowns,texture_residual");
+    let losses = progress.losses.iter().map(|p| LossRow {
+        seconds: p.seconds,
+        iteration: p.iteration,
+        train: p.train,
+        held_out: p.held_out,
+        ..LossRow::default()
     });
-    let fits = progress.fits.iter().map(|p| {
-        let values = (
-            None,
-            None,
-            Some(p.residual),
-            Some(p.stderr),
-            Some(p.unknowns),
-        );
-        (p.seconds, p.iteration, values)
+    let fits = progress.fits.iter().map(|p| LossRow {
+        seconds: p.seconds,
+        iteration: p.iteration,
+        residual: Some(p.residual),
+        stderr: p.stderr,
+        unknowns: Some(p.unknowns),
+        ..LossRow::default()
     });
-    let mut rows: Vec<_> = losses.chain(fits).collect();
-    rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let textures = progress.textures.iter().map(|p| LossRow {
+        seconds: p.seconds,
+        iteration: p.iteration,
+        texture_residual: Some(p.residual),
+        ..LossRow::default()
+    });
+    let mut rows: Vec<LossRow> = losses.chain(fits).chain(textures).collect();
+    rows.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
     rows.into_iter().for_each(|row| table.row(row));
     table
 }
