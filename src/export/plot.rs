@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::export::canvas::{DrawError, FONT, PlotArea, write_plot};
 use crate::export::scale::Scale;
-use crate::inverse::solver::{LossPoint, Progress, Stage, with_ends};
+use crate::inverse::solver::{LossPoint, Progress, Stage};
 use plotters::prelude::{
     BLACK, ChartBuilder, Circle, Color, EmptyElement, IntoFont, LineSeries, PathElement, Polygon,
     RGBColor, Rectangle, SeriesLabelPosition, Text, WHITE,
@@ -245,21 +245,24 @@ pub fn loss_plot(progress: &Progress) -> Plot {
         let points = progress.losses.iter();
         Series::line(name, points.filter_map(|p| Some([p.seconds, value(p)?])))
     };
-    let mark = |(end, stage): (f64, &Stage)| (end - stage.seconds, stage.name.clone());
+    let mark = |stage: &Stage| (stage.ended - stage.seconds, stage.name.clone());
     let residuals = progress.fits.iter().map(|p| [p.seconds, p.residual]);
     let textures = progress.textures.iter().map(|p| [p.seconds, p.residual]);
     let series = [
         curve("in the fit", |p| p.train),
         curve("held out", |p| p.held_out),
         Series::line("residual, relative", residuals),
-        Series::line("textures one by one, relative", textures),
+        Series {
+            draw: Draw::Dots,
+            ..Series::line("textures one by one, relative", textures)
+        },
     ];
     Plot {
         title: "Loss".to_owned(),
         x: Axis::linear("seconds"),
         y: Axis::logarithmic("mean absolute difference, radiance; residuals, relative"),
         series: (series.into_iter().filter(|s| !s.points.is_empty())).collect(),
-        marks: with_ends(&progress.stages).map(mark).collect(),
+        marks: progress.stages.iter().map(mark).collect(),
         labels: Vec::new(),
     }
 }

@@ -85,6 +85,9 @@ pub struct Stage {
     pub name: String,
     /// Its duration.
     pub seconds: f64,
+    /// Seconds of solving at its end.
+    #[serde(default)]
+    pub ended: f64,
     /// Number of iterations.
     pub iterations: u64,
     /// Loss in the fit at its end.
@@ -95,14 +98,6 @@ pub struct Stage {
     pub kept: bool,
     /// The reason, in a sentence.
     pub why: String,
-}
-
-/// Stages, each with the seconds from the start to its end.
-pub fn with_ends(stages: &[Stage]) -> impl Iterator<Item = (f64, &Stage)> {
-    stages.iter().scan(0.0, |end, stage| {
-        *end += stage.seconds;
-        Some((*end, stage))
-    })
 }
 
 /// The observer's answer to a report.

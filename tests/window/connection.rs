@@ -286,6 +286,7 @@ fn progress() -> Progress {
         stages: vec![Stage {
             name: "objects".into(),
             seconds: 2.0,
+            ended: 2.0,
             iterations: 20,
             train_loss: Some(0.13),
             held_out_loss: Some(0.16),

@@ -2,7 +2,7 @@
 
 use crate::app::panels::plot::{at, decades, hovered, legend};
 use crate::app::theme;
-use crate::inverse::solver::{LossPoint, Progress, Stage, with_ends};
+use crate::inverse::solver::{LossPoint, Progress, Stage};
 use egui::Ui;
 use egui_plot::{Line, LineStyle, Plot, PlotPoints, Points, VLine};
 
@@ -38,9 +38,9 @@ pub fn pane(ui: &mut Ui, progress: &Progress) {
         .y_grid_spacer(decades)
         .y_axis_min_width(36.0)
         .show(ui, |plot| {
-            for (end, _) in with_ends(&progress.stages) {
+            for stage in &progress.stages {
                 // Without a name it stays out of the legend.
-                let line = VLine::new("", end).color(tokens.outline);
+                let line = VLine::new("", stage.ended).color(tokens.outline);
                 plot.vline(line.style(LineStyle::dashed_loose()));
             }
             // A single point has no line.
@@ -65,8 +65,7 @@ pub fn pane(ui: &mut Ui, progress: &Progress) {
 
 /// The stage at a time since the start; `None` after the last that has ended.
 fn stage_at(stages: &[Stage], seconds: f64) -> Option<&str> {
-    let mut stages = with_ends(stages);
-    let (_, stage) = stages.find(|(end, _)| seconds <= *end)?;
+    let stage = stages.iter().find(|stage| seconds <= stage.ended)?;
     Some(&stage.name)
 }
 
@@ -96,9 +95,9 @@ mod tests {
 
     #[test]
     fn a_time_is_in_the_first_stage_that_ends_no_earlier() {
-        let stages = [("light field", 2.0), ("refine", 3.0)].map(|(name, seconds)| Stage {
+        let stages = [("light field", 2.0), ("refine", 5.0)].map(|(name, ended)| Stage {
             name: name.to_owned(),
-            seconds,
+            ended,
             ..Stage::default()
         });
         let at = |seconds| stage_at(&stages, seconds);

@@ -188,12 +188,13 @@ impl Run<'_, '_> {
             }
         };
         let (started, iterations) = self.state.stage_started;
-        let seconds = self.monitor.seconds() - started;
+        let ended = self.monitor.seconds();
         let progress = &mut self.monitor.progress;
         progress.stages.retain(|stage| stage.name != name);
         progress.stages.push(Stage {
             name,
-            seconds,
+            seconds: ended - started,
+            ended,
             iterations: progress.iterations.saturating_sub(iterations),
             train_loss: best.train,
             held_out_loss: best.held_out,

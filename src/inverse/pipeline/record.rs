@@ -66,10 +66,11 @@ impl Pipeline<'_, '_> {
 
     /// Records a stage that leaves the estimate as it is, without losses.
     pub(super) fn record_unmeasured(&mut self, name: &str, started: f64, kept: bool, why: String) {
-        let seconds = self.monitor.seconds() - started;
+        let ended = self.monitor.seconds();
         self.monitor.progress.stages.push(Stage {
             name: name.to_owned(),
-            seconds,
+            seconds: ended - started,
+            ended,
             iterations: self.monitor.progress.iterations,
             train_loss: None,
             held_out_loss: None,
