@@ -415,6 +415,13 @@ fn rooms_that_are_in_the_table_are_not_solved_again() {
     assert_eq!((count, summary.families["plain"].n), (1, 1));
     assert_eq!(text().lines().count(), 3);
     assert!(text().contains("0.0.9,preview"));
+    // So is a table that was broken off in its header or in its first row.
+    let header = both.find('\n').expect("a header") + 1;
+    for end in [9, header, header + 9] {
+        std::fs::write(&path, &both[..end]).expect("written");
+        solved(&plan(&[1], Preset::Preview), 0);
+        assert_eq!(text().len(), if end < header { 0 } else { header });
+    }
     std::fs::write(&path, "a,b\n1,2\n").expect("written");
     let error = run(
         folder.path(),
@@ -426,7 +433,7 @@ fn rooms_that_are_in_the_table_are_not_solved_again() {
         error
             .expect_err("another table")
             .to_string()
-            .contains("rooms.csv:2")
+            .contains("rooms.csv:1")
     );
 }
 

@@ -68,6 +68,16 @@ static USUAL: Sharpness = Sharpness {
     contrast: Vec::new(),
 };
 
+/// All pixels.
+fn gbuffer(problem: &Problem) -> GBuffer {
+    GBuffer::new(
+        problem,
+        HoldOut::from(&*SETTINGS),
+        SETTINGS.seed,
+        usize::MAX,
+    )
+}
+
 fn task<'a>(problem: &'a Problem, gbuffer: &'a GBuffer, paths: u64) -> Task<'a> {
     Task {
         problem,
@@ -80,12 +90,7 @@ fn task<'a>(problem: &'a Problem, gbuffer: &'a GBuffer, paths: u64) -> Task<'a> 
 }
 
 fn refined(problem: &Problem, estimate: &Estimate, objects: &[usize], paths: u64) -> Refined {
-    let gbuffer = GBuffer::new(
-        problem,
-        HoldOut::from(&*SETTINGS),
-        SETTINGS.seed,
-        usize::MAX,
-    );
+    let gbuffer = gbuffer(problem);
     let task = task(problem, &gbuffer, paths);
     let (refined, ended) = refine(&task, estimate, objects, &|_| None, &mut |_, _| Ok(()));
     ended.expect("nobody ends it");
@@ -281,12 +286,7 @@ fn threads_do_not_change_a_bit() {
 /// Weaker smoothing shows more of the poster, which the residuals tell while it is fitted.
 #[test]
 fn residuals_fall_while_the_poster_is_fitted() {
-    let gbuffer = GBuffer::new(
-        &ROOM.problem,
-        HoldOut::from(&*SETTINGS),
-        SETTINGS.seed,
-        usize::MAX,
-    );
+    let gbuffer = gbuffer(&ROOM.problem);
     let task = task(&ROOM.problem, &gbuffer, 10_000);
     let mut residuals = Vec::new();
     let mut report = |step: Step, _| {
@@ -302,12 +302,7 @@ fn residuals_fall_while_the_poster_is_fitted() {
 
 #[test]
 fn who_ends_it_is_obeyed() {
-    let gbuffer = GBuffer::new(
-        &ROOM.problem,
-        HoldOut::from(&*SETTINGS),
-        SETTINGS.seed,
-        usize::MAX,
-    );
+    let gbuffer = gbuffer(&ROOM.problem);
     let task = task(&ROOM.problem, &gbuffer, 10_000);
     let ended_after = |most: u32| {
         let mut calls = 0;
@@ -333,12 +328,7 @@ fn who_ends_it_is_obeyed() {
 /// Light and texture may fail to agree: what held-out pixels say decides between the states.
 #[test]
 fn states_that_held_out_pixels_speak_against_are_not_kept() {
-    let gbuffer = GBuffer::new(
-        &ROOM.problem,
-        HoldOut::from(&*SETTINGS),
-        SETTINGS.seed,
-        usize::MAX,
-    );
+    let gbuffer = gbuffer(&ROOM.problem);
     let task = task(&ROOM.problem, &gbuffer, 10_000);
     let judged = |judge: &dyn Fn(&Estimate) -> Option<f64>| {
         let (refined, ended) = refine(&task, &ROOM.estimate, &[BACK], judge, &mut |_, _| Ok(()));

@@ -24,10 +24,13 @@ use photographed::Draft;
 use serde::{Deserialize, Serialize};
 
 /// A kind of generated room. Its number is a key of the random numbers of its rooms.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize,
+)]
 #[serde(rename_all = "lowercase")]
 pub enum Family {
     /// Lamps in view.
+    #[default]
     Plain = 0,
     /// No lamp in view.
     Unseen = 1,

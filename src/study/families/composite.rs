@@ -14,7 +14,7 @@ use crate::room::generated::Family;
 use crate::scene::Scene;
 use crate::study::experiments::{Cylinder, chair_model, insert, places, up, upright};
 use crate::study::families::Plan;
-use crate::study::families::row::{RoomRow, SolveKey};
+use crate::study::families::row::{RoomRow, Solve};
 use crate::study::families::score::{Solved, solved};
 use crate::transport::lit::LitScene;
 use crate::transport::path::PathOptions;
@@ -44,7 +44,7 @@ const CHANGED: f32 = 0.025;
 const MAX_POWER: u32 = 6;
 
 /// Comparison of the composites in a room with the truth; means over its photographs.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct CompositeRow {
     /// The program's version.
     pub relit: String,
@@ -118,9 +118,12 @@ pub fn composite(family: Family, seed: u64, plan: &Plan) -> Result<Option<Compos
 }
 
 impl RoomRow for CompositeRow {
-    fn solve(&self) -> SolveKey<'_> {
-        let size = [self.width, self.height];
-        (&self.relit, &self.preset, size, self.family, self.seed)
+    fn solve(&self) -> Solve<'_> {
+        (&self.relit, &self.preset, [self.width, self.height])
+    }
+
+    fn room(&self) -> (Family, u64) {
+        (self.family, self.seed)
     }
 }
 

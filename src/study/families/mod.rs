@@ -10,7 +10,7 @@ mod segments;
 mod summary;
 
 pub use composite::{CompositeRow, Decision, composite};
-pub use row::{RoomRow, Row, Rows, SolveKey};
+pub use row::{RoomRow, Row, Rows, Solve};
 pub use score::measure;
 pub use summary::{Quantiles, Summary, plot, summarize};
 
@@ -30,6 +30,13 @@ pub struct Plan {
     pub size: [u32; 2],
     /// The preset of every solve.
     pub preset: Preset,
+}
+
+impl Plan {
+    /// How rooms are solved by this version of the program.
+    fn solve(&self) -> Solve<'_> {
+        (env!("CARGO_PKG_VERSION"), self.preset.word(), self.size)
+    }
 }
 
 /// Progress of [`run`].

@@ -12,16 +12,19 @@ use std::io::Write;
 use std::path::PathBuf;
 
 /// A room that was solved, as a row of a table.
-pub trait RoomRow: Serialize + DeserializeOwned {
-    /// How and which room was solved.
-    fn solve(&self) -> SolveKey<'_>;
+pub trait RoomRow: Default + Serialize + DeserializeOwned {
+    /// How it was solved.
+    fn solve(&self) -> Solve<'_>;
+
+    /// Its family and seed.
+    fn room(&self) -> (Family, u64);
 }
 
-/// Program version, name of the preset, width and height of the photographs, family and seed.
-pub type SolveKey<'a> = (&'a str, &'a str, [u32; 2], Family, u64);
+/// Program version, name of the preset, width and height of the photographs.
+pub type Solve<'a> = (&'a str, &'a str, [u32; 2]);
 
 /// Comparison of a solved room with its truth.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// The program's version.
     pub relit: String,
@@ -64,9 +67,12 @@ pub struct Row {
 }
 
 impl RoomRow for Row {
-    fn solve(&self) -> SolveKey<'_> {
-        let size = [self.width, self.height];
-        (&self.relit, &self.preset, size, self.family, self.seed)
+    fn solve(&self) -> Solve<'_> {
+        (&self.relit, &self.preset, [self.width, self.height])
+    }
+
+    fn room(&self) -> (Family, u64) {
+        (self.family, self.seed)
     }
 }
 
@@ -96,44 +102,37 @@ impl<R: RoomRow> Rows<R> {
                 "name another folder with --out",
             )
         };
-        let end = text.rfind('\n').map_or(0, |end| end + 1);
-        let rows: Vec<R> = csv::Reader::from_reader(&text.as_bytes()[..end])
+        let header = line(R::default(), true).map_err(io)?;
+        let header = header.split_inclusive(|&byte| byte == b'\n').next();
+        let header = header.unwrap_or_default();
+        let whole = &text.as_bytes()[..text.rfind('\n').map_or(0, |end| end + 1)];
+        let is_ours = match whole {
+            [] => header.starts_with(text.as_bytes()),
+            whole => whole.starts_with(header),
+        };
+        if !is_ours {
+            return Err(another(1));
+        }
+        let rows = csv::Reader::from_reader(whole)
             .deserialize()
             .enumerate()
             .map(|(index, row)| row.map_err(|_| another(index + 2)))
             .collect::<Result<_>>()?;
-        let header = match rows.first() {
-            Some(row) => line(row, true).map_err(io)?,
-            None => Vec::new(),
-        };
-        let first = text.split_inclusive('\n').next().unwrap_or_default();
-        if !header.starts_with(first.as_bytes()) && end == text.len() {
-            return Err(another(1));
-        }
-        if end < text.len() {
-            write_bytes(&path, &text.as_bytes()[..end])?;
+        if whole.len() < text.len() {
+            write_bytes(&path, whole)?;
         }
         Ok(Self { path, rows })
     }
 
     /// The row of a room that was solved according to a plan.
     pub fn find(&self, plan: &Plan, family: Family, seed: u64) -> Option<&R> {
-        let key = (
-            env!("CARGO_PKG_VERSION"),
-            plan.preset.word(),
-            plan.size,
-            family,
-            seed,
-        );
-        self.rows.iter().find(|row| row.solve() == key)
+        let mut rows = self.rows.iter();
+        rows.find(|row| row.solve() == plan.solve() && row.room() == (family, seed))
     }
 
     /// The rows of the plan's program version, preset and size.
     pub fn of<'a>(&'a self, plan: &'a Plan) -> impl Iterator<Item = &'a R> {
-        self.rows.iter().filter(|row| {
-            let (relit, preset, size, ..) = row.solve();
-            (relit, preset, size) == (env!("CARGO_PKG_VERSION"), plan.preset.word(), plan.size)
-        })
+        (self.rows.iter()).filter(|row| row.solve() == plan.solve())
     }
 
     /// Appends a row, also to the file.
