@@ -422,19 +422,22 @@ fn rooms_that_are_in_the_table_are_not_solved_again() {
         solved(&plan(&[1], Preset::Preview), 0);
         assert_eq!(text().len(), if end < header { 0 } else { header });
     }
-    std::fs::write(&path, "a,b\n1,2\n").expect("written");
-    let error = run(
-        folder.path(),
-        &plan(&[1], Preset::Preview),
-        &|| true,
-        &mut |_| {},
-    );
-    assert!(
-        error
-            .expect_err("another table")
-            .to_string()
-            .contains("rooms.csv:1")
-    );
+    for another in [&b"a,b\n1,2\n"[..], b"\xff\xfe"] {
+        std::fs::write(&path, another).expect("written");
+        let error = run(
+            folder.path(),
+            &plan(&[1], Preset::Preview),
+            &|| true,
+            &mut |_| {},
+        );
+        assert!(
+            error
+                .expect_err("another table")
+                .to_string()
+                .contains("rooms.csv:1")
+        );
+        assert_eq!(std::fs::read(&path).expect("there"), another);
+    }
 }
 
 #[test]

@@ -254,7 +254,7 @@ pub fn loss_plot(progress: &Progress) -> Plot {
         Series::line("residual, relative", residuals),
         Series {
             draw: Draw::Dots,
-            ..Series::line("textures one by one, relative", textures)
+            ..Series::line("textures, relative", textures)
         },
     ];
     Plot {

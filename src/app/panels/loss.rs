@@ -47,7 +47,7 @@ pub fn pane(ui: &mut Ui, progress: &Progress) {
             for (name, points, color) in [
                 ("Loss", train, tokens.train),
                 ("Held out", held_out, tokens.held_out),
-                ("Residual of the fit, relative", fits, tokens.outline),
+                ("Residual of the fit, relative", fits, tokens.text),
             ] {
                 if points.len() == 1 {
                     plot.points(Points::new(name, points).color(color).radius(3.0));
@@ -57,7 +57,7 @@ pub fn pane(ui: &mut Ui, progress: &Progress) {
                 }
             }
             if !textures.is_empty() {
-                let points = Points::new("Textures one by one, relative", textures);
+                let points = Points::new("Textures, relative", textures);
                 plot.points(points.color(tokens.weak).radius(1.5));
             }
         });

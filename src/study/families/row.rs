@@ -90,9 +90,9 @@ impl<R: RoomRow> Rows<R> {
     /// The file cannot be read or written, or is another table.
     pub fn open(path: PathBuf) -> Result<Self> {
         let io = |error: std::io::Error| Error::io(&path, &error);
-        let text = match std::fs::read_to_string(&path) {
-            Ok(text) => text,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
+        let bytes = match std::fs::read(&path) {
+            Ok(bytes) => bytes,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Vec::new(),
             Err(error) => return Err(io(error)),
         };
         let another = |line: usize| {
@@ -105,9 +105,10 @@ impl<R: RoomRow> Rows<R> {
         let header = line(R::default(), true).map_err(io)?;
         let header = header.split_inclusive(|&byte| byte == b'\n').next();
         let header = header.unwrap_or_default();
-        let whole = &text.as_bytes()[..text.rfind('\n').map_or(0, |end| end + 1)];
+        let end = bytes.iter().rposition(|&byte| byte == b'\n');
+        let whole = &bytes[..end.map_or(0, |end| end + 1)];
         let is_ours = match whole {
-            [] => header.starts_with(text.as_bytes()),
+            [] => header.starts_with(&bytes),
             whole => whole.starts_with(header),
         };
         if !is_ours {
@@ -118,7 +119,7 @@ impl<R: RoomRow> Rows<R> {
             .enumerate()
             .map(|(index, row)| row.map_err(|_| another(index + 2)))
             .collect::<Result<_>>()?;
-        if whole.len() < text.len() {
+        if whole.len() < bytes.len() {
             write_bytes(&path, whole)?;
         }
         Ok(Self { path, rows })
