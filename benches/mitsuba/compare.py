@@ -8,7 +8,8 @@ which objects are lamps.
     DRJIT_LIBLLVM_PATH=/path/to/libLLVM.so benches/mitsuba/compare.py CAPTURE [--quick] [--relit target/release/relit]
 
 Needs `pip install mitsuba` (3.9) and a libLLVM of 16 or later. The full grid takes about two hours (36 settings
-of 180 s), --quick about eight minutes (6 settings of 60 s).
+of 180 s), --quick about eight minutes (6 settings of 60 s); --only runs the settings whose description holds a text.
+Under `taskset` both programs use the given cores alone.
 """
 
 import argparse
@@ -28,6 +29,8 @@ import drjit as dr
 import mitsuba as mi
 
 mi.set_variant("llvm_ad_rgb")
+# With a pool of one thread, as on one core, Dr.Jit 1.5 waits for ever.
+dr.set_thread_count(max(2, dr.thread_count()))
 
 # What may emit, mode, loss, learning rate of albedo, of emission, samples a pixel (of each buffer). Rates fall to a
 # hundredth by the end. "told" favours Mitsuba: it is told which objects are lamps, which relit has to find out; with
@@ -224,14 +227,15 @@ def main():
     parser.add_argument("capture", type=pathlib.Path)
     parser.add_argument("--relit", default="target/release/relit")
     parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--only", default="", help="the settings that hold this text, such as 'told batch l2'")
     parser.add_argument("--seconds", type=float, help="budget of each setting")
     parser.add_argument("--out", default="mitsuba.csv")
     options = parser.parse_args()
-    grid = QUICK if options.quick else GRID
+    grid = [setting for setting in (QUICK if options.quick else GRID) if options.only in describe(setting)]
     seconds = options.seconds or (60.0 if options.quick else 180.0)
     truth = json.loads((options.capture / "truth.json").read_text())["objects"]
 
-    print(f"Mitsuba {mi.__version__}, Dr.Jit {dr.__version__}, {platform.machine()}, {os.cpu_count()} cores, "
+    print(f"Mitsuba {mi.__version__}, Dr.Jit {dr.__version__}, {platform.machine()}, {len(os.sched_getaffinity(0))} cores, "
           f"load {os.getloadavg()[0]:.1f} at the start")
     print(f"grid: {len(grid)} settings of {seconds:g} s, {PIXELS_PER_BATCH} pixels a batch or one photograph in turn, "
           f"depth {DEPTH}, rates falling to {DECAY:g} of the first")

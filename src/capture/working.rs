@@ -8,6 +8,9 @@ use glam::{BVec3, DVec3, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
 
+/// Most pixels used in a solve; larger photographs are reduced together.
+pub const WORKING_PIXELS: u64 = 4_000_000;
+
 /// Radius in pixels around a saturated pixel within which blur, resampling and compression mix in clipped light.
 const CLIPPED_RADIUS: usize = 2;
 

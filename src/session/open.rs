@@ -8,7 +8,7 @@ use crate::capture::photograph::{Photograph, PhotographSource};
 use crate::capture::read::{ReadOptions, read};
 use crate::capture::reading::Reading;
 use crate::capture::regroup::regroup;
-use crate::capture::working::{Working, load_working};
+use crate::capture::working::{WORKING_PIXELS, Working, load_working};
 use crate::error::{Error, Result};
 use crate::inverse::estimate::Estimate;
 use crate::room;
@@ -18,9 +18,6 @@ use crate::session::command::{OpenOptions, Source};
 use crate::session::open_capture::OpenCapture;
 use std::fs;
 use std::sync::Arc;
-
-/// Most pixels used in a solve; larger photographs are reduced together.
-const WORKING_PIXELS: u64 = 4_000_000;
 
 /// Reads a capture and its photographs.
 ///

@@ -4,6 +4,7 @@ use crate::calibrate::problem::Problem;
 use crate::capture::Capture;
 use crate::capture::photograph::Photograph;
 use crate::capture::truth::Truth;
+use crate::capture::working::{WORKING_PIXELS, load_working};
 use crate::error::Result;
 use crate::room::Room;
 use crate::room::photographs::{self, Rendering};
@@ -54,6 +55,22 @@ impl Subject {
                 photographs,
             },
             metric: Metric::Truth(Box::new(reference)),
+        })
+    }
+
+    /// The same with photographs at the resolution that the program solves at.
+    ///
+    /// # Errors
+    /// A photograph cannot be read.
+    pub fn at_working_resolution(&self) -> Result<Self> {
+        let working = load_working(&self.capture, WORKING_PIXELS)?;
+        let scene = Scene::new(&self.capture.at(&working))?;
+        Ok(Self {
+            problem: Problem {
+                scene: Arc::new(scene),
+                photographs: working.photographs,
+            },
+            ..self.clone()
         })
     }
 

@@ -3,10 +3,8 @@
 use crate::error::Result;
 use crate::export::plot::{Axis, Draw, Plot, Series};
 use crate::export::table::Table;
-use crate::inverse::settings::{LightSampling, Preset, Settings};
-use crate::study::experiments::course::{
-    CACHE_WITHOUT, Evaluator, Mark, cache_settings, cached, descend, paper_settings,
-};
+use crate::inverse::settings::{Preset, Settings};
+use crate::study::experiments::course::{Evaluator, Mark, cached, descend, paper_settings};
 use crate::study::experiments::objects::{self, Posed};
 use crate::study::experiments::study::{Bench, Findings, Limits, Study, Summary, brief};
 use crate::study::experiments::twin::twin;
@@ -51,9 +49,6 @@ fn run(bench: &Bench) -> Result<Findings> {
     let how: String = (objects.iter())
         .map(|posed| format!("{} ", posed.how))
         .collect();
-    let aims: Vec<String> = (objects.iter())
-        .map(|posed| format!("{} % for \"{}\"", brief(posed.aim), posed.name))
-        .collect();
     let longer = Limits {
         seconds: limits.seconds * PAPER_FRACTION,
         ..limits
@@ -81,7 +76,7 @@ fn run(bench: &Bench) -> Result<Findings> {
                 ..Evaluator::new(&posed.subject, u32::MAX)
             };
             if by_cache {
-                let settings = settings(posed, seed, bench.quick, limits.seconds);
+                let settings = settings(seed, bench.quick, limits.seconds);
                 cache.push(cached(bench, &gauge, &settings)?);
             } else {
                 paper.extend(descend(bench, &gauge, &paper_settings(seed), longer).pop());
@@ -92,11 +87,15 @@ fn run(bench: &Bench) -> Result<Findings> {
     bench.go_on()?;
     Ok(Findings {
         how: format!(
-            "{how}Solved by the transport cache as one colour an object, with {CACHE_WITHOUT}, and with light sampling alone \
-             where nothing but lamps gives light. {} Errors are ‖ρ̂ − ρ‖₂ / ‖ρ‖₂ over RGB, seeds 1 to {}. The paper's objects \
-             are others than these: its numbers are marks to aim at, not the same measurement. The paper's descent runs per object with nothing annealed, for {} at {} seeds. \
-             Seconds are those of this machine and whatever else ran on it.",
-            stopping(bench.quick, &aims, limits),
+            "{how}Solved by the transport cache with preset `{}` as the program runs it: all stages on, ended by its own \
+             rule{}. Errors are ‖ρ̂ − ρ‖₂ / ‖ρ‖₂ over RGB, seeds 1 to {}. The paper's objects are others than these, \
+             so that its numbers are not the same measurement. The paper's descent runs per object with nothing annealed, \
+             for {} at {} seeds. Seconds are those of this machine and whatever else ran on it.",
+            preset(bench.quick).word(),
+            match bench.quick {
+                true => String::new(),
+                false => format!(" (for {} at most)", limits.words()),
+            },
             bench.seeds,
             longer.words(),
             PAPER_SEEDS.min(bench.seeds),
@@ -115,36 +114,20 @@ fn run(bench: &Bench) -> Result<Findings> {
     })
 }
 
-/// When the solves end, as a sentence.
-fn stopping(quick: bool, aims: &[String], limits: Limits) -> String {
-    if quick {
-        return "Solves end by themselves, and the preset is `preview` but for the object in closed form: this is the short \
-                form, which tries the program."
-            .to_owned();
+fn preset(quick: bool) -> Preset {
+    match quick {
+        true => Preset::Preview,
+        false => Preset::Balanced,
     }
-    format!(
-        "The preset is `balanced`, which goes on until the error that it claims of itself (the median relative standard error \
-         of the albedos seen) is below a number of this study's, chosen below the paper's: {}; or for {} at most.",
-        aims.join(", "),
-        limits.words(),
-    )
 }
 
-fn settings(posed: &Posed, seed: u64, quick: bool, seconds: f64) -> Settings {
+/// The program's defaults: nothing is switched off, and no error is asked for.
+fn settings(seed: u64, quick: bool, seconds: f64) -> Settings {
     Settings {
-        preset: if quick && posed.interreflects {
-            Preset::Preview
-        } else {
-            Preset::Balanced
-        },
-        light_sampling: if posed.interreflects {
-            LightSampling::Mis
-        } else {
-            LightSampling::Emitter
-        },
-        target_error: if quick { 0.0 } else { posed.aim },
+        preset: preset(quick),
+        seed,
         time: if seconds.is_finite() { seconds } else { 0.0 },
-        ..cache_settings(seed, quick)
+        ..Settings::default()
     }
 }
 

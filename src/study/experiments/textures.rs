@@ -53,12 +53,13 @@ struct Measure {
 }
 
 fn run(bench: &Bench) -> Result<Findings> {
-    let room;
+    let (room, own);
     let (subject, truth) = match bench.subject {
         Some(subject) => (subject, None),
         None => {
             room = built_in(true, bench.quick)?;
-            (&room.subject, Some(&room.lit))
+            own = room.subject.at_working_resolution()?;
+            (&own, Some(&room.lit))
         }
     };
     let measure = Measure::new(subject, truth);
