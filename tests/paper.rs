@@ -130,7 +130,7 @@ fn parts_begin_at_the_albedo_of_the_whole() {
         descent.albedo[k] = Vec3::splat(0.1 * k as f32);
         descent.emission[k] = material.emission;
     }
-    let triangles = descent.refined(&problem.scene, &[]);
+    let (triangles, _) = descent.refined(&problem.scene, &[]);
     let objects = materials.len();
     let of = |triangle: usize| problem.scene.object_of[triangle] as usize;
     for triangle in 0..problem.scene.triangles.len() {
@@ -139,7 +139,8 @@ fn parts_begin_at_the_albedo_of_the_whole() {
             descent.albedo[of(triangle)]
         );
     }
-    let mut parts = triangles.refined(&problem.scene, &vec![true; problem.scene.triangles.len()]);
+    let (mut parts, _) =
+        triangles.refined(&problem.scene, &vec![true; problem.scene.triangles.len()]);
     assert_eq!(
         parts.albedo.len(),
         objects + 4 * problem.scene.triangles.len()

@@ -34,6 +34,11 @@ impl Adam {
         (self.second.len() == count && self.steps.len() == count).then_some(count)
     }
 
+    /// Number of gradients of a parameter.
+    pub fn steps(&self, index: usize) -> u32 {
+        self.steps[index]
+    }
+
     /// The change of one parameter, given its gradient.
     pub fn step(&mut self, index: usize, gradient: Vec3, learning_rate: f32) -> Vec3 {
         self.steps[index] = self.steps[index].saturating_add(1);

@@ -7,6 +7,7 @@ use crate::inverse::paper::patches::{MAX_DEPTH, Patches};
 use crate::inverse::paper::pixel::{Drawn, Path};
 use crate::inverse::settings::Settings;
 use crate::math::rng::Stream;
+use crate::math::stats::Moments;
 use crate::scene::geometry::Hit;
 use crate::transport::arrival::RayCount;
 use glam::Vec3;
@@ -16,10 +17,12 @@ use rayon::prelude::*;
 const MAX_PIXELS: usize = 400_000;
 /// Least number of pixels of a patch that is cut: four for each of its parts.
 const MIN_COVERED: u64 = 16;
-/// Fraction of the pixels of all patches that may be cut, which the cut patches cover.
-const CUT: f64 = 0.5;
+/// Fraction of the squared error of all patches that may be cut, which is in the cut patches.
+const CUT: f64 = 0.9;
+/// Standard errors of a patch's mean squared error above zero from which it may be cut.
+const SIGNIFICANT: f64 = 2.0;
 /// Paths for each of two independent colours of a pixel.
-const SAMPLES: u64 = 2;
+const SAMPLES: u64 = 8;
 /// First of the sample keys of these paths, disjoint from those of the descent.
 const KEY: u64 = 1 << 63;
 
@@ -100,31 +103,33 @@ impl Cover {
         let Some(patches) = &descent.patches else {
             return (Vec::new(), cast);
         };
-        let mut sums = vec![(0.0, 0u64); patches.len()];
+        let mut errors = vec![Moments::default(); patches.len()];
         for ((_, _, hit), (error, _)) in self.pixels.iter().zip(each) {
-            let sum = &mut sums[patches.of_texel(patches.layout.texel(hit))];
-            sum.0 += error;
-            sum.1 += self.stride;
+            errors[patches.of_texel(patches.layout.texel(hit))].push(error);
         }
-        (worst(&sums, &patches.depth), cast)
+        (worst(&errors, self.stride, &patches.depth), cast)
     }
 }
 
-/// The patches of greatest mean error that together cover the fraction [`CUT`] of the pixels of all that may be cut. `sums` holds
-/// the sum of errors and the number of pixels of each patch.
-fn worst(sums: &[(f64, u64)], depth: &[u8]) -> Vec<bool> {
-    let may_be_cut = |&p: &usize| sums[p].1 >= MIN_COVERED && depth[p] < MAX_DEPTH;
-    let mut order: Vec<usize> = (0..sums.len()).filter(may_be_cut).collect();
-    let mean = |p: usize| sums[p].0 / sums[p].1 as f64;
-    order.sort_by(|&p, &q| mean(q).total_cmp(&mean(p)));
-    let all: u64 = order.iter().map(|&p| sums[p].1).sum();
-    let mut which = vec![false; sums.len()];
-    let mut covered = 0;
+/// The patches of greatest mean squared error that together hold the fraction [`CUT`] of the error of all that may be cut. `errors`
+/// has the errors of each patch's pixels, each of which stands for `stride` pixels.
+fn worst(errors: &[Moments], stride: u64, depth: &[u8]) -> Vec<bool> {
+    let may_be_cut = |&p: &usize| {
+        let error = &errors[p];
+        let is_significant = error.mean > SIGNIFICANT * error.standard_error();
+        is_significant && error.count * stride >= MIN_COVERED && depth[p] < MAX_DEPTH
+    };
+    let mut order: Vec<usize> = (0..errors.len()).filter(may_be_cut).collect();
+    order.sort_by(|&p, &q| errors[q].mean.total_cmp(&errors[p].mean));
+    let sum = |p: usize| errors[p].mean * errors[p].count as f64;
+    let all: f64 = order.iter().map(|&p| sum(p)).sum();
+    let mut which = vec![false; errors.len()];
+    let mut held = 0.0;
     for p in order {
-        if covered as f64 >= CUT * all as f64 {
+        if held >= CUT * all {
             break;
         }
-        covered += sums[p].1;
+        held += sum(p);
         which[p] = true;
     }
     which
@@ -135,19 +140,28 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_worst_are_cut_and_what_is_small_or_fine_is_not() {
-        let sums = [
-            (100.0, 100),
-            (900.0, 100),
-            (500.0, 15),
-            (50.0, 100),
-            (0.0, 0),
+    fn the_worst_are_cut_and_what_is_small_or_fine_or_within_noise_is_not() {
+        let patch = |mean: f64, spread: f64, pixels: u64| -> Moments {
+            let sign = |pixel| if pixel % 2 == 0 { 1.0 } else { -1.0 };
+            (0..pixels)
+                .map(|pixel| mean + spread * sign(pixel))
+                .collect()
+        };
+        let errors = [
+            patch(1.0, 0.1, 100),
+            patch(9.0, 0.1, 100),
+            patch(5.0, 0.1, 15),
+            patch(0.5, 0.1, 100),
+            patch(9.0, 90.0, 100),
+            Moments::default(),
         ];
-        let depth = [0, 0, 0, 0, 0];
-        let which = worst(&sums, &depth);
-        assert_eq!(which, [true, true, false, false, false]);
-        let which = worst(&sums, &[0, MAX_DEPTH, 0, 0, 0]);
-        assert_eq!(which, [true, false, false, false, false]);
-        assert_eq!(worst(&sums[4..], &depth[4..]), [false]);
+        let depth = [0; 6];
+        let which = worst(&errors, 1, &depth);
+        assert_eq!(which, [true, true, false, false, false, false]);
+        let which = worst(&errors, 1, &[0, MAX_DEPTH, 0, 0, 0, 0]);
+        assert_eq!(which, [true, false, false, true, false, false]);
+        assert_eq!(worst(&errors[5..], 1, &depth[5..]), [false]);
+        // One pixel of four is looked at.
+        assert!(worst(&errors, 4, &depth)[2]);
     }
 }

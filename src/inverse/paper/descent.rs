@@ -3,6 +3,7 @@
 use crate::calibrate::problem::Problem;
 use crate::inverse::known::Known;
 use crate::inverse::paper::adam::Adam;
+use crate::inverse::paper::average::Average;
 use crate::inverse::paper::pace::Pace;
 use crate::inverse::paper::patches::Patches;
 use crate::inverse::paper::pixel::{Draw, PixelGradient, Rendering, draw};
@@ -28,6 +29,9 @@ const MIN_EXPECTED_ALBEDO: f32 = 0.8;
 /// Objects with less than this fraction of the greatest emission are no lamps once triangles have albedos: the noise of the
 /// steps leaves a little emission everywhere. `evaluate` uses the same fraction.
 const DIM: f32 = 0.01;
+/// Gradients of a patch before its first step. ADAM's first steps have the size of the rate whatever the gradient, so that rare
+/// bright paths would count too little.
+const WARM_UP: u32 = 16;
 
 /// The state of the descent.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -44,6 +48,8 @@ pub struct Descent {
     /// zero a fixed point.
     believed: Vec<f32>,
     adam: Adam,
+    /// Of the steps of the present level, albedos first, then emissions.
+    average: Average,
     steps: u64,
     /// The known rough specular lobe of each object; empty without lobes.
     #[serde(skip)]
@@ -79,6 +85,7 @@ impl Descent {
             level: 0,
             believed: vec![1.0; objects],
             adam: Adam::new(2 * objects),
+            average: Average::new(vec![Vec3::ZERO; 2 * objects]),
             steps: 0,
             lobes: Vec::new(),
             fixed: Vec::new(),
@@ -105,15 +112,17 @@ impl Descent {
             && self.albedo.len() == objects + patches.map_or(0, Patches::len)
             && self.believed.len() == objects
             && self.adam.parameters() == Some(self.albedo.len() + objects)
+            && self.average.parameters() == self.adam.parameters()
             && patches.is_none_or(|patches| patches.fit(triangles))
     }
 
     /// The next refinement: an albedo for each triangle, or the patches in `which` cut into four. Parts start with the albedo of
-    /// the whole, dim objects lose their emission, and ADAM and the level start again.
-    pub fn refined(&self, scene: &Scene, which: &[bool]) -> Self {
+    /// the whole, dim objects lose their emission, and ADAM and the level start again. Also returns the object of each triangle, or
+    /// the old patch of each patch.
+    pub fn refined(&self, scene: &Scene, which: &[bool]) -> (Self, Vec<u32>) {
         let objects = self.emission.len();
         let mut emission = self.emission.clone();
-        let (patches, parents) = match &self.patches {
+        let (patches, parents, first) = match &self.patches {
             None => {
                 let brightest = emission
                     .iter()
@@ -124,18 +133,18 @@ impl Descent {
                     .filter(is_dim)
                     .for_each(|e| *e = Vec3::ZERO);
                 let patches = Patches::triangles(scene.triangles.len());
-                (patches, scene.object_of.clone())
+                (patches, scene.object_of.clone(), 0)
             }
             Some(patches) => {
                 let (patches, parents) = patches.cut(which);
-                let index = |parent: u32| parent + objects as u32;
-                (patches, parents.into_iter().map(index).collect())
+                (patches, parents, objects)
             }
         };
         let mut albedo = self.albedo[..objects].to_vec();
-        albedo.extend(parents.iter().map(|&parent| self.albedo[parent as usize]));
-        Self {
+        albedo.extend((parents.iter()).map(|&parent| self.albedo[first + parent as usize]));
+        let refined = Self {
             adam: Adam::new(albedo.len() + objects),
+            average: Average::new([&albedo[..], &emission].concat()),
             albedo,
             emission,
             patches: Some(patches),
@@ -143,12 +152,14 @@ impl Descent {
             fixed: Vec::new(),
             emitters: None,
             ..self.clone()
-        }
+        };
+        (refined, parents)
     }
 
     /// Goes to the next level, with shorter steps and larger batches.
     pub fn slow_down(&mut self) {
         self.level += 1;
+        self.average.restart();
         if self.patches.is_none() && self.level >= ROULETTE_FROM {
             let expected = |albedo: &Vec3| albedo.max_element().max(MIN_EXPECTED_ALBEDO);
             self.believed = self.albedo.iter().map(expected).collect();
@@ -168,23 +179,32 @@ impl Descent {
                 continue;
             }
             if let Some(albedo) = pinned.albedo {
-                self.albedo[k] = albedo;
-                if let Some(patches) = &self.patches {
-                    let patches_of_k = (scene.objects[k].triangles.iter())
-                        .flat_map(|&triangle| patches.of_triangle(triangle as usize));
-                    for patch in patches_of_k {
-                        self.albedo[self.emission.len() + patch] = albedo;
-                    }
+                let patches_of_k = self.patches.iter().flat_map(|patches| {
+                    (scene.objects[k].triangles.iter())
+                        .flat_map(|&triangle| patches.of_triangle(triangle as usize))
+                });
+                let objects = self.emission.len();
+                for index in patches_of_k.map(|patch| objects + patch).chain([k]) {
+                    self.albedo[index] = albedo;
+                    self.average.set(index, albedo);
                 }
             }
             if let Some(emission) = pinned.emission {
+                self.average.set(self.albedo.len() + k, emission);
                 self.set_object_emission(scene, k, emission);
             }
         }
     }
 
-    /// Sets the emission of all objects.
-    pub fn set_emission(&mut self, emission: Vec<Vec3>) {
+    /// Albedos and emissions, averaged over the steps of the present level: what a stage yields.
+    pub fn averaged(&self) -> (&[Vec3], &[Vec3]) {
+        self.average.values().split_at(self.albedo.len())
+    }
+
+    /// Sets all parameters.
+    pub fn set(&mut self, albedo: Vec<Vec3>, emission: Vec<Vec3>) {
+        self.average = Average::new([&albedo[..], &emission].concat());
+        self.albedo = albedo;
         self.emission = emission;
         self.emitters = None;
     }
@@ -260,7 +280,11 @@ impl Descent {
                 continue;
             }
             let change = self.adam.step(index, gradient[index], rate);
+            if self.patches.is_some() && self.adam.steps(index) <= WARM_UP {
+                continue;
+            }
             self.albedo[index] = (self.albedo[index] + change).clamp(Vec3::ZERO, Vec3::ONE);
+            self.average.add(index, self.albedo[index]);
         }
         let penalty = Vec3::splat(settings.emission_weight as f32);
         for k in 0..objects {
@@ -270,6 +294,7 @@ impl Descent {
                 let change = self.adam.step(index, gradient[index] + penalty, rate);
                 let emission = (self.emission[k] + change).max(Vec3::ZERO);
                 self.set_object_emission(&problem.scene, k, emission);
+                self.average.add(index, emission);
             }
         }
         outcome

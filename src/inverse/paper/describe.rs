@@ -31,7 +31,7 @@ pub fn undetermined(problem: &Problem, gbuffer: &GBuffer) -> Vec<&'static str> {
         .collect()
 }
 
-/// The estimate of the present parameters; `covered` is the number of pixels of each patch. The paper's descent has no standard
+/// The estimate of the averaged parameters; `covered` is the number of pixels of each patch. The paper's descent has no standard
 /// errors: the width of the range is reported instead. Objects with a note in `notes` are reported as not identifiable.
 pub fn describe(
     problem: &Problem,
@@ -41,7 +41,8 @@ pub fn describe(
     covered: &[u64],
 ) -> Estimate {
     let scene = &problem.scene;
-    let own = &descent.albedo[scene.objects.len()..];
+    let (albedos, emissions) = descent.averaged();
+    let own = &albedos[scene.objects.len()..];
     let texels = descent.patches.as_ref().map(|patches| TexelEstimate {
         colors: Arc::new(TexelColors {
             layout: patches.layout.clone(),
@@ -56,10 +57,10 @@ pub fn describe(
     let objects = (0..scene.objects.len())
         .map(|k| {
             let albedo = match &texels {
-                None => descent.albedo[k],
+                None => albedos[k],
                 Some(texels) => mean_albedo(scene, k, &texels.colors),
             };
-            let emission = descent.emission[k];
+            let emission = emissions[k];
             ObjectEstimate {
                 albedo,
                 albedo_stderr: Vec3::ONE,

@@ -4,6 +4,7 @@
 //! A stage keeps the state with the least loss on held-out pixels, including its start. Triangles are cut until that gains nothing.
 
 pub mod adam;
+mod average;
 mod cover;
 pub mod descent;
 mod describe;

@@ -8,7 +8,7 @@
 //! | | step | pixels per batch | paths for a colour | for a derivative |
 //! | --- | --- | --- | --- | --- |
 //! | objects | 5·10⁻³ / 2^level | 8, 16, then 32 | 2^level | 2^level, 8 at most |
-//! | patches | 5·10⁻³ / 2^level | 8 × patches / objects, 8192 at most | 4 | 2 |
+//! | patches | 5·10⁻³ / 2^level | 8 × patches / objects, 1024 at most | 4 | 2 |
 
 use crate::inverse::paper::descent::Descent;
 use crate::inverse::settings::Settings;
@@ -18,7 +18,7 @@ const BATCH_DOUBLINGS: u32 = 2;
 /// Greatest number of doublings of the paths for a derivative.
 const DERIVATIVE_DOUBLINGS: u32 = 3;
 /// Greatest number of pixels in a batch, unless the settings ask for more.
-const MAX_BATCH: u64 = 8192;
+const MAX_BATCH: u64 = 1024;
 /// Paths for a pixel's colour and for its derivative once there are patches, relative to the settings.
 const PATCH_SAMPLES: [u64; 2] = [4, 2];
 

@@ -3,8 +3,14 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Least relative decrease between the means of two consecutive windows of measurements.
-const MIN_DECREASE: f64 = 0.01;
+/// What tells that a loss has converged.
+#[derive(Debug, Clone, Copy)]
+pub struct Rule {
+    /// Number of measurements in a window.
+    pub window: usize,
+    /// Least relative decrease between the means of two consecutive windows.
+    pub decrease: f64,
+}
 
 /// The losses since the last change of the learning rate.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -23,8 +29,9 @@ impl Schedule {
         self.until_measured = self.until_measured.saturating_sub(paths);
     }
 
-    /// Adds a loss; the next one is due after `next` paths. Returns whether the mean of the last `window` losses has converged.
-    pub fn measured(&mut self, loss: Option<f64>, next: u64, window: usize) -> bool {
+    /// Adds a loss; the next one is due after `next` paths. Returns whether the losses have converged by a rule.
+    pub fn measured(&mut self, loss: Option<f64>, next: u64, rule: Rule) -> bool {
+        let window = rule.window;
         self.until_measured = next;
         self.losses.extend(loss);
         if self.losses.len() < 2 * window {
@@ -32,7 +39,7 @@ impl Schedule {
         }
         let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
         let (before, last) = self.losses[self.losses.len() - 2 * window..].split_at(window);
-        mean(last) > mean(before) * (1.0 - MIN_DECREASE)
+        mean(last) > mean(before) * (1.0 - rule.decrease)
     }
 
     /// Removes the losses of an earlier learning rate.
@@ -47,12 +54,16 @@ mod tests {
 
     #[test]
     fn a_falling_loss_goes_on_and_a_level_one_stands_still_after_two_windows() {
+        let rule = Rule {
+            window: 4,
+            decrease: 0.01,
+        };
         let mut falling = Schedule::default();
-        assert!((0..20).all(|i| !falling.measured(Some(0.9f64.powi(i)), 1, 4)));
+        assert!((0..20).all(|i| !falling.measured(Some(0.9f64.powi(i)), 1, rule)));
         let mut level = Schedule::default();
-        assert!((0..7).all(|_| !level.measured(Some(1.0), 1, 4)));
-        assert!(level.measured(Some(1.0), 1, 4));
+        assert!((0..7).all(|_| !level.measured(Some(1.0), 1, rule)));
+        assert!(level.measured(Some(1.0), 1, rule));
         level.start_over();
-        assert!(!level.measured(Some(1.0), 1, 4));
+        assert!(!level.measured(Some(1.0), 1, rule));
     }
 }

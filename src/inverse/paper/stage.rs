@@ -1,10 +1,10 @@
 //! The stages of a descent: per object, per triangle, and on parts of triangles.
 
+use crate::inverse::paper::Run;
 use crate::inverse::paper::descent::Descent;
 use crate::inverse::paper::pace::Pace;
 use crate::inverse::paper::patches::{MAX_DEPTH, Patches};
-use crate::inverse::paper::schedule::Schedule;
-use crate::inverse::paper::{Run, State};
+use crate::inverse::paper::schedule::{Rule, Schedule};
 use crate::inverse::solver::{Stage, Termination};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -17,13 +17,20 @@ const PATCH_LEVELS: u32 = 3;
 const MEASURE_EVERY: u64 = 6;
 /// Mean number of batch pixels that see a patch between two measurements.
 const MEETINGS: u64 = 8;
-/// Measurements in a window of the schedule, for objects.
-const WINDOW: usize = 4;
-/// Measurements in a window of the schedule, for patches.
-const PATCH_WINDOW: usize = 2;
+/// When the loss of a level has converged, for objects.
+const RULE: Rule = Rule {
+    window: 4,
+    decrease: 0.01,
+};
+/// The same for patches: a texture is part of few pixels, so that the loss falls slowly while it forms.
+const PATCH_RULE: Rule = Rule {
+    window: 4,
+    decrease: 0.002,
+};
 
-/// Greatest number of pixels of a patch. Textures within 16 × 16 pixels are found by cutting twice.
-const MAX_COVERED: u64 = 256;
+/// Patches that are cut are cut again until their parts cover no more pixels of all photographs together. A texture within them shows
+/// after cutting once more.
+const MAX_COVERED: u64 = 32;
 /// Consecutive stages without a gain that end the descent: a texture may show only after cutting twice.
 const FRUITLESS: u32 = 2;
 
@@ -97,12 +104,12 @@ impl Run<'_, '_> {
                 }
                 if self.state.schedule.due() {
                     let loss = self.measure();
-                    let (levels, window) = match self.state.descent.patches {
-                        None => (LEVELS, WINDOW),
-                        Some(_) => (PATCH_LEVELS, PATCH_WINDOW),
+                    let (levels, rule) = match self.state.descent.patches {
+                        None => (LEVELS, RULE),
+                        Some(_) => (PATCH_LEVELS, PATCH_RULE),
                     };
                     let next = self.until_measured();
-                    if self.state.schedule.measured(loss, next, window) {
+                    if self.state.schedule.measured(loss, next, rule) {
                         if !settings.anneal || self.state.descent.level >= levels {
                             return Ok(());
                         }
@@ -143,10 +150,10 @@ impl Run<'_, '_> {
         let judged = loss.held_out.or(loss.train);
         let best = self.state.best.as_ref();
         if best.is_none_or(|best| is_below(judged, best.judged())) {
-            let descent = &self.state.descent;
+            let (albedo, emission) = self.state.descent.averaged();
             self.state.best = Some(Best {
-                albedo: descent.albedo.clone(),
-                emission: descent.emission.clone(),
+                albedo: albedo.to_vec(),
+                emission: emission.to_vec(),
                 train: loss.train,
                 held_out: loss.held_out,
                 at_first: best.map_or(judged, |best| best.at_first),
@@ -179,7 +186,7 @@ impl Run<'_, '_> {
                 ("objects".to_owned(), what)
             }
             (Some(n), 0) => {
-                let what = "triangles or parts of large ones, lamps stay in place";
+                let what = "triangles, lamps stay in place";
                 ("triangles".to_owned(), format!("{n} {what}"))
             }
             (Some(n), cuts) => {
@@ -202,15 +209,14 @@ impl Run<'_, '_> {
             why: format!("{what}: {course}"),
         });
         self.state.fruitless = if kept { 0 } else { self.state.fruitless + 1 };
-        self.state.descent.albedo = best.albedo;
-        self.state.descent.set_emission(best.emission);
+        self.state.descent.set(best.albedo, best.emission);
         self.describe();
     }
 
     /// Starts the next stage: an albedo for each triangle, then the worst patches cut into four. `false` if there is none.
     fn refine(&mut self) -> bool {
         let scene = &self.problem.scene;
-        let (which, cuts) = match self.state.descent.patches {
+        let (mut which, cuts) = match self.state.descent.patches {
             None if scene.triangles.len() <= scene.objects.len() => return false,
             None => (Vec::new(), 0),
             Some(_) => {
@@ -224,36 +230,27 @@ impl Run<'_, '_> {
                 (worst, self.state.cuts + 1)
             }
         };
-        self.state = State {
-            descent: self.state.descent.refined(&self.problem.scene, &which),
-            schedule: Schedule::default(),
-            best: None,
-            cuts,
-            fruitless: self.state.fruitless,
-            stage_started: (self.monitor.seconds(), self.monitor.progress.iterations),
-        };
-        self.update_cover();
-        self.cut_to_size();
-        true
-    }
-
-    /// Cuts patches with more than [`MAX_COVERED`] pixels, such as the triangles of a wall, so that errors of parts are compared at
-    /// the scale of textures.
-    fn cut_to_size(&mut self) {
         loop {
-            let Some(patches) = &self.state.descent.patches else {
-                return;
+            let (refined, parents) = self.state.descent.refined(scene, &which);
+            self.state.descent = refined;
+            self.update_cover();
+            let Some(patches) = self.state.descent.patches.as_ref().filter(|_| cuts > 0) else {
+                break;
             };
-            let covered = self.covered.iter().zip(&patches.depth);
-            let which: Vec<bool> = covered
-                .map(|(&pixels, &depth)| pixels > MAX_COVERED && depth < MAX_DEPTH)
+            // Parts of what was cut that are too large still.
+            which = (parents.iter().zip(&patches.depth).zip(&self.covered))
+                .map(|((&parent, &depth), &covered)| {
+                    which[parent as usize] && covered > MAX_COVERED && depth < MAX_DEPTH
+                })
                 .collect();
             if !which.contains(&true) {
-                return;
+                break;
             }
-            self.state.descent = self.state.descent.refined(&self.problem.scene, &which);
-            self.update_cover();
         }
+        self.state.schedule = Schedule::default();
+        self.state.cuts = cuts;
+        self.state.stage_started = (self.monitor.seconds(), self.monitor.progress.iterations);
+        true
     }
 
     /// Counts the pixels of each patch, and fixes the albedos of those without any.
