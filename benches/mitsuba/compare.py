@@ -232,6 +232,8 @@ def main():
     parser.add_argument("--out", default="mitsuba.csv")
     options = parser.parse_args()
     grid = [setting for setting in (QUICK if options.quick else GRID) if options.only in describe(setting)]
+    if not grid:
+        parser.error(f"--only: no setting holds {options.only!r}; a full run lists them all")
     seconds = options.seconds or (60.0 if options.quick else 180.0)
     truth = json.loads((options.capture / "truth.json").read_text())["objects"]
 

@@ -153,6 +153,11 @@ impl Run<'_, '_> {
         if self.covered.is_empty() || self.described.elapsed() >= DESCRIBE_EVERY {
             self.describe();
         }
+        self.tell()
+    }
+
+    /// Reports the estimate as it was described last.
+    fn tell(&mut self) -> Result<(), Termination> {
         let state = &self.state;
         self.monitor
             .report(&self.estimate, &|progress| Checkpoint::new(progress, state))

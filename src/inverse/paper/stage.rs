@@ -87,8 +87,9 @@ impl Run<'_, '_> {
             if !(goes_on && self.refine()) {
                 return Ok(Termination::Converged);
             }
+            // Whoever watches sees what the stage left; a checkpoint has the next one.
+            self.tell()?;
             self.describe();
-            self.report()?;
         }
     }
 

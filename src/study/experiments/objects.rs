@@ -192,6 +192,46 @@ fn noise_of(subject: &Subject, object: &str, halves: &[Vec<Photograph>; 2]) -> f
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::inverse::settings::{LightSampling, Preset, Settings};
+    use crate::study::experiments::course::{cache_settings, solved};
+    use crate::study::experiments::study::Bench;
+    use std::time::Duration;
+
+    /// From so near that no outline of the object is seen, and with light sampling alone, paths have next to no noise.
+    #[test]
+    fn a_convex_object_comes_out_as_exactly_as_its_closed_form_allows() {
+        let mut room = gem();
+        room.views = View::all(&[
+            [[0.02, 0.57, 0.03], [0.0, 0.3, 0.0]],
+            [[0.06, 0.57, 0.05], [0.05, 0.3, 0.02]],
+            [[-0.05, 0.57, -0.04], [-0.05, 0.3, -0.02]],
+            [[0.0, 1.2, 0.03], [0.0, 1.6, 0.0]],
+        ]);
+        let photographs = closed_form::photographs(&room, [48, 36]);
+        let subject = Subject::of_photographs(&room, photographs).expect("a room");
+        let bench = Bench {
+            quick: true,
+            time: Duration::MAX,
+            seeds: 2,
+            subject: None,
+            say: &|_| {},
+            show: &|_| {},
+            stopped: &|| false,
+        };
+        for seed in bench.seeds() {
+            let settings = Settings {
+                preset: Preset::Balanced,
+                light_sampling: LightSampling::Emitter,
+                ..cache_settings(seed, true)
+            };
+            let solution = solved(&bench, &subject, &settings).expect("solved");
+            let truth = subject.truth().expect("known");
+            let errors = truth.errors(&subject.problem.scene, &solution.estimate);
+            let gem = (errors.per_object.iter()).find(|(name, _)| name == "gem");
+            let error = gem.and_then(|(_, errors)| errors.albedo_rel);
+            assert!(error.is_some_and(|error| error < 1e-5), "{error:?}");
+        }
+    }
 
     #[test]
     fn the_closed_form_is_what_paths_render_on_the_mean() {
