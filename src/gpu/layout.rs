@@ -89,19 +89,6 @@ shared! {
         /// Indices into `data` of corner normals and corner colours, or [`NONE`].
         corners: [u32; 4],
     }
-
-    struct Pixel {
-        /// Sum of radiance, and number of samples whose first hit is an inserted object.
-        over: [f32; 4],
-        /// Sum of radiance without the inserted objects.
-        under: [f32; 4],
-        /// Sum of radiance of the samples whose first hit is an inserted object.
-        covered: [f32; 4],
-        /// The same without the inserted objects.
-        covered_under: [f32; 4],
-        /// Numbers of rays, of rejected samples, unused, and of samples that the objects change.
-        counts: [u32; 4],
-    }
 }
 
 /// The head of the shader: constants, structs and bindings. `stack_size` entries bound the hierarchy's depth.
@@ -135,6 +122,7 @@ fn head(stack_size: u32) -> String {
         ("ALBEDO_TEXELS", ALBEDO_TEXELS),
         ("ALBEDO_IMAGE", ALBEDO_IMAGE),
         ("STACK_SIZE", stack_size),
+        ("INSERT_WORDS", INSERT.words),
     ] {
         let _ = writeln!(text, "const {name} = {value}u;");
     }
@@ -152,7 +140,7 @@ fn head(stack_size: u32) -> String {
     text
 }
 
-/// The writable binding.
+/// The writable binding: words of four numbers, some per pixel or ray ([`Kernel::words`]).
 pub(super) const FILM: &str = "film";
 
 /// The storage bindings after the uniform one, with their element types. WebGPU guarantees eight.
@@ -164,7 +152,7 @@ pub(super) const BINDINGS: [(&str, &str); 8] = [
     ("emitters", "vec4<u32>"),
     ("environment", "vec4<u32>"),
     ("rays", "vec4<f32>"),
-    (FILM, "Pixel"),
+    (FILM, "vec4<u32>"),
 ];
 
 /// The modules; their order does not matter.
@@ -182,12 +170,31 @@ const MODULES: [&str; 11] = [
     include_str!("shaders/queries.wgsl"),
 ];
 
-/// The entry point that accumulates radiance of a pixel.
-pub(super) const RENDER: &str = "render";
-/// The entry point that accumulates radiance of a pixel with and without inserted objects.
-pub(super) const INSERT: &str = "insert";
-/// The entry point that intersects a ray.
-pub(super) const TRACE: &str = "trace";
+/// An entry point of the shader.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Kernel {
+    pub name: &'static str,
+    /// Words of the film buffer per pixel or ray.
+    pub words: u32,
+}
+
+/// Accumulates radiance: its sum, and the number of rays plus 2²⁴ times that of rejected samples.
+pub(super) const RENDER: Kernel = Kernel {
+    name: "render",
+    words: 1,
+};
+/// Accumulates radiance with and without inserted objects. Words: the sum with them, and the number of samples whose first hit is
+/// an inserted object; the sum without them; both sums over those samples alone; the numbers of rays, of rejected samples and of
+/// samples that the objects change.
+pub(super) const INSERT: Kernel = Kernel {
+    name: "insert",
+    words: 5,
+};
+/// Intersects a ray: distance, barycentric weights and the triangle's index.
+pub(super) const TRACE: Kernel = Kernel {
+    name: "trace",
+    words: 1,
+};
 
 /// The source for traversals with a stack of `stack_size` entries.
 pub(super) fn source(stack_size: u32) -> String {
@@ -215,7 +222,7 @@ mod tests {
         assert!(valid.is_ok(), "{valid:?}");
         for kernel in [RENDER, INSERT, TRACE] {
             let mut entries = module.entry_points.iter();
-            assert!(entries.any(|entry| entry.name == kernel));
+            assert!(entries.any(|entry| entry.name == kernel.name));
         }
     }
 }

@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::gpu::card::Card;
 use crate::gpu::layout::{
-    BINDINGS, Dispatch, FILM, INSERT, Material, NONE, Pixel, RENDER, TRACE, WORKGROUP, source,
+    BINDINGS, Dispatch, FILM, INSERT, Kernel, Material, NONE, RENDER, TRACE, WORKGROUP, source,
 };
 use crate::gpu::materials::Inserted;
 use crate::gpu::pace::Pace;
@@ -15,7 +15,6 @@ use crate::transport::film::Film;
 use crate::transport::lit::LitScene;
 use crate::transport::path::PathOptions;
 use crate::transport::surroundings::Surroundings;
-use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
 use std::ops::Range;
 use std::time::Instant;
@@ -23,6 +22,9 @@ use wgpu::BufferUsages as Usage;
 
 /// Samples summed in f32 on the card before the sums are added in f64.
 const CHUNK: u32 = 16;
+
+/// Four numbers of the film buffer, as their bits.
+type Word = [u32; 4];
 
 /// A camera and how its paths are traced.
 #[derive(Debug, Clone, Copy)]
@@ -67,7 +69,7 @@ pub struct Tracer {
     description: Dispatch,
     layout: wgpu::BindGroupLayout,
     shader: wgpu::ShaderModule,
-    pipelines: Vec<(&'static str, wgpu::ComputePipeline)>,
+    pipelines: Vec<(Kernel, wgpu::ComputePipeline)>,
     pace: Pace,
 }
 
@@ -137,10 +139,10 @@ impl Tracer {
         let range = film.samples..film.samples + samples;
         let description = with_view(self.description, view);
         self.dispatch_all(RENDER, description, pixels, range, |pixel, found| {
-            let [r, g, b, _] = found.over;
-            added.sums[pixel as usize] += Vec3::new(r, g, b).as_dvec3();
-            added.rays += u64::from(found.counts[0]);
-            added.rejected += u64::from(found.counts[1]);
+            let [r, g, b, counts] = found[0];
+            added.sums[pixel as usize] += color([r, g, b]);
+            added.rays += u64::from(counts & 0x00ff_ffff);
+            added.rejected += u64::from(counts >> 24);
         })?;
         for (sum, added) in film.sums.iter_mut().zip(added.sums) {
             *sum += added;
@@ -176,15 +178,18 @@ impl Tracer {
         let description = with_view(self.description, view);
         self.dispatch_all(INSERT, description, pixels, samples, |pixel, found| {
             let sum = &mut sums[(pixel - first) as usize];
-            let color = |[r, g, b, _]: [f32; 4]| Vec3::new(r, g, b).as_dvec3();
-            sum.with += color(found.over);
-            sum.without += color(found.under);
-            sum.covered_with += color(found.covered);
-            sum.covered_without += color(found.covered_under);
-            sum.covered += found.over[3] as u32;
-            sum.changed |= found.counts[3] > 0;
-            sum.rays += found.counts[0];
-            sum.rejected += found.counts[1];
+            let [with, without, covered_with, covered_without, counts] = found else {
+                return;
+            };
+            let sums = |&[r, g, b, _]: &Word| color([r, g, b]);
+            sum.with += sums(with);
+            sum.without += sums(without);
+            sum.covered_with += sums(covered_with);
+            sum.covered_without += sums(covered_without);
+            sum.covered += f32::from_bits(with[3]) as u32;
+            sum.rays += counts[0];
+            sum.rejected += counts[1];
+            sum.changed |= counts[2] > 0;
         })?;
         Ok(sums)
     }
@@ -213,8 +218,8 @@ impl Tracer {
         description.slice[0] = rays.len().max(1) as u32;
         let all = 0..rays.len() as u32;
         self.dispatch_all(TRACE, description, all, 0..1, |ray, found| {
-            let [t, b1, b2, _] = found.over;
-            let triangle = found.counts[0];
+            let [t, b1, b2, triangle] = found[0];
+            let [t, b1, b2] = [t, b1, b2].map(f32::from_bits);
             hits[ray as usize] = (triangle != NONE).then_some(Hit {
                 t,
                 triangle,
@@ -228,17 +233,18 @@ impl Tracer {
     /// Traces samples of pixels in bands and chunks; `add` gets the sums of up to [`CHUNK`] samples of each pixel.
     fn dispatch_all(
         &mut self,
-        kernel: &'static str,
+        kernel: Kernel,
         mut description: Dispatch,
         pixels: Range<u32>,
         samples: Range<u32>,
-        mut add: impl FnMut(u32, &Pixel),
+        mut add: impl FnMut(u32, &[Word]),
     ) -> Result<()> {
         let pipeline = self.pipeline(kernel)?;
-        let fit = (self.card.max_buffer() / size_of::<Pixel>() as u64).min(u64::from(u32::MAX));
+        let pixel_size = u64::from(kernel.words) * size_of::<Word>() as u64;
+        let fit = (self.card.max_buffer() / pixel_size).min(u64::from(u32::MAX));
         let band = (fit as u32).min(pixels.len() as u32).max(1);
         let card = self.card.clone();
-        let size = u64::from(band) * size_of::<Pixel>() as u64;
+        let size = u64::from(band) * pixel_size;
         let film = Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST;
         let film = buffer(&card, FILM, size, film)?;
         let read = buffer(&card, FILM, size, Usage::MAP_READ | Usage::COPY_DST)?;
@@ -250,8 +256,9 @@ impl Tracer {
                 clear(&card, &film);
                 description.paths[3] = band.start;
                 self.slices(&pipeline, &group, description, band.clone(), chunk..end)?;
-                for (pixel, found) in band.clone().zip(self.read(&film, &read, band.len())?) {
-                    add(pixel, &found);
+                let found = self.read(&film, &read, band.len() * kernel.words as usize)?;
+                for (pixel, found) in band.clone().zip(found.chunks_exact(kernel.words as usize)) {
+                    add(pixel, found);
                 }
             }
         }
@@ -297,8 +304,8 @@ impl Tracer {
         Ok(())
     }
 
-    fn read(&self, film: &wgpu::Buffer, read: &wgpu::Buffer, pixels: usize) -> Result<Vec<Pixel>> {
-        let bytes = (pixels * size_of::<Pixel>()) as u64;
+    fn read(&self, film: &wgpu::Buffer, read: &wgpu::Buffer, words: usize) -> Result<Vec<Word>> {
+        let bytes = (words * size_of::<Word>()) as u64;
         let card = &self.card;
         let mut encoder = card.device.create_command_encoder(&Default::default());
         encoder.copy_buffer_to_buffer(film, 0, read, 0, bytes);
@@ -313,7 +320,7 @@ impl Tracer {
             return Err(failed());
         }
         let view = read.get_mapped_range(0..bytes).map_err(|_| failed())?;
-        let mut found = vec![Pixel::zeroed(); pixels];
+        let mut found = vec![Word::default(); words];
         bytemuck::cast_slice_mut(&mut found).copy_from_slice(&view);
         drop(view);
         read.unmap();
@@ -338,7 +345,7 @@ impl Tracer {
     }
 
     /// The pipeline of a kernel, compiled at first use.
-    fn pipeline(&mut self, kernel: &'static str) -> Result<wgpu::ComputePipeline> {
+    fn pipeline(&mut self, kernel: Kernel) -> Result<wgpu::ComputePipeline> {
         if let Some((_, pipeline)) = self.pipelines.iter().find(|(k, _)| *k == kernel) {
             return Ok(pipeline.clone());
         }
@@ -350,10 +357,10 @@ impl Tracer {
                 ..Default::default()
             });
             device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some(kernel),
+                label: Some(kernel.name),
                 layout: Some(&layout),
                 module: &self.shader,
-                entry_point: Some(kernel),
+                entry_point: Some(kernel.name),
                 compilation_options: Default::default(),
                 cache: None,
             })
@@ -361,6 +368,10 @@ impl Tracer {
         self.pipelines.push((kernel, pipeline.clone()));
         Ok(pipeline)
     }
+}
+
+fn color(bits: [u32; 3]) -> DVec3 {
+    Vec3::from_array(bits.map(f32::from_bits)).as_dvec3()
 }
 
 /// Adds a view to the scene's dispatch parameters.

@@ -41,6 +41,11 @@ fn begin_sample(pixel: u32, sample: u32) -> Ray {
     return camera_ray(corner + uniform2());
 }
 
+fn add_to_film(word: u32, value: vec4<f32>) {
+    film[word] = bitcast<vec4<u32>>(bitcast<vec4<f32>>(film[word]) + value);
+}
+
+// A thread begins its next sample as soon as a path ends: threads of a group would otherwise wait for the longest path.
 @compute @workgroup_size(WORKGROUP)
 fn render(@builtin(global_invocation_id) id: vec3<u32>) {
     let pixel = pixel_of(id.x);
@@ -48,11 +53,26 @@ fn render(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     with_inserted = true;
-    for (var i = 0u; i < dispatch.paths.x; i += 1u) {
-        let path = radiance(begin_sample(pixel, dispatch.slice.w + i));
-        film[pixel - dispatch.paths.w].over += vec4<f32>(path.radiance, 0.0);
-        film[pixel - dispatch.paths.w].counts += vec4<u32>(path.rays, u32(path.rejected), 0u, 0u);
+    var sum = vec3<f32>(0.0);
+    var counts = 0u;
+    var done = 0u;
+    var path = begin_path(begin_sample(pixel, dispatch.slice.w));
+    loop {
+        if extend(&path) {
+            continue;
+        }
+        let found = end_path(path);
+        sum += found.radiance;
+        counts += found.rays + (u32(found.rejected) << 24u);
+        done += 1u;
+        if done >= dispatch.paths.x {
+            break;
+        }
+        path = begin_path(begin_sample(pixel, dispatch.slice.w + done));
     }
+    let word = pixel - dispatch.paths.w;
+    let before = film[word];
+    film[word] = vec4<u32>(bitcast<vec3<u32>>(bitcast<vec3<f32>>(before.xyz) + sum), before.w + counts);
 }
 
 // Pairs of paths with and without the inserted objects, from the same random numbers (`compose::insert`).
@@ -62,6 +82,7 @@ fn insert(@builtin(global_invocation_id) id: vec3<u32>) {
     if pixel == NONE {
         return;
     }
+    let word = INSERT_WORDS * (pixel - dispatch.paths.w);
     for (var i = 0u; i < dispatch.paths.x; i += 1u) {
         let ray = begin_sample(pixel, dispatch.slice.w + i);
         let state = stream_state;
@@ -86,13 +107,13 @@ fn insert(@builtin(global_invocation_id) id: vec3<u32>) {
         let keep = select(1.0, 0.0, rejected);
         let over = with_objects.radiance * keep;
         let under = without.radiance * keep;
-        film[pixel - dispatch.paths.w].over += vec4<f32>(over, f32(covered));
-        film[pixel - dispatch.paths.w].under += vec4<f32>(under, 0.0);
+        add_to_film(word, vec4<f32>(over, f32(covered)));
+        add_to_film(word + 1u, vec4<f32>(under, 0.0));
         if covered {
-            film[pixel - dispatch.paths.w].covered += vec4<f32>(over, 0.0);
-            film[pixel - dispatch.paths.w].covered_under += vec4<f32>(under, 0.0);
+            add_to_film(word + 2u, vec4<f32>(over, 0.0));
+            add_to_film(word + 3u, vec4<f32>(under, 0.0));
         }
         let changed = covered || any(over != under);
-        film[pixel - dispatch.paths.w].counts += vec4<u32>(with_objects.rays + without.rays, u32(rejected), 0u, u32(changed));
+        film[word + 4u] += vec4<u32>(with_objects.rays + without.rays, u32(rejected), u32(changed), 0u);
     }
 }

@@ -121,11 +121,13 @@ fn test_triangle(slot: u32, ray: Ray, shear: Shear, nearest: ptr<function, Hit>)
     }
 }
 
+// Private, since WGSL fills a function's variables with zeros at each call.
+var<private> stack: array<u32, STACK_SIZE>;
+
 fn traverse(ray: Ray, any_hit: bool) -> Hit {
     var nearest = Hit(ray.t_max, NONE, 0.0, 0.0, NONE);
     let inverse = reciprocal(ray.direction);
     let shear = shear_of(ray.direction, inverse);
-    var stack: array<u32, STACK_SIZE>;
     var depth = 0u;
     var node = 0u;
     if enter(0u, ray, inverse, nearest.t) >= FAR {

@@ -6,6 +6,17 @@ struct Frame {
     n: vec3<f32>,
 }
 
+// A path on its way.
+struct Path {
+    ray: Ray,
+    throughput: vec3<f32>,
+    total: vec3<f32>,
+    rays: u32,
+    bounce: u32,
+    // Of `ray`'s direction; negative for the camera ray, which has no competing light sample.
+    bsdf_pdf: f32,
+}
+
 // The result of one path.
 struct PathSample {
     radiance: vec3<f32>,
@@ -78,70 +89,85 @@ fn direct_light(surface: Surface, local: Frame, wo: vec3<f32>, rays: ptr<functio
     return scattered.xyz * light.radiance / light.pdf * power_heuristic(light.pdf, scattered.w);
 }
 
+fn begin_path(camera_ray: Ray) -> Path {
+    return Path(camera_ray, vec3<f32>(1.0), vec3<f32>(0.0), 0u, 0u, -1.0);
+}
+
+fn end_path(path: Path) -> PathSample {
+    let rejected = !is_finite(path.total);
+    return PathSample(select(path.total, vec3<f32>(0.0), rejected), path.rays, rejected);
+}
+
+// Adds the next vertex; false if the path ended there.
+fn extend(path: ptr<function, Path>) -> bool {
+    // Find the vertex.
+    let ray = (*path).ray;
+    let throughput = (*path).throughput;
+    let bsdf_pdf = (*path).bsdf_pdf;
+    (*path).rays += 1u;
+    let hit = traverse(ray, false);
+    if hit.slot == NONE {
+        if dispatch.lights.z > 0u {
+            let light = environment_at(environment_pixel(normal_or(ray.direction, vec3<f32>(0.0))));
+            let weight = select(power_heuristic(bsdf_pdf, light.w * (1.0 - dispatch.emitter_fraction.x)), 1.0, bsdf_pdf < 0.0);
+            (*path).total += throughput * light.xyz * weight;
+        }
+        return false;
+    }
+    let surface = surface_at(hit, ray);
+
+    // Add emission.
+    let wo = -normal_or(ray.direction, vec3<f32>(0.0));
+    let cos_emitter = dot(surface.normal, wo);
+    if cos_emitter > 0.0 && any(surface.emission != vec3<f32>(0.0)) {
+        let along = ray.direction * surface.t;
+        let light_pdf = dispatch.emitter_fraction.x * surface.emitter_pdf * dot(along, along) / cos_emitter;
+        let weight = select(power_heuristic(bsdf_pdf, light_pdf), 1.0, bsdf_pdf < 0.0);
+        (*path).total += throughput * surface.emission * weight;
+    }
+    if (*path).bounce >= dispatch.paths.y {
+        return false;
+    }
+
+    // Next-event estimation.
+    let local = frame_around(surface.shading_normal * select(1.0, -1.0, cos_emitter < 0.0));
+    let local_wo = to_local(local, wo);
+    var shadow_rays = 0u;
+    (*path).total += throughput * direct_light(surface, local, local_wo, &shadow_rays);
+    (*path).rays += shadow_rays;
+
+    // Continue the path by sampling the BSDF.
+    let choice = uniform1();
+    let next = bsdf_sample(surface, local_wo, choice, uniform2());
+    if next.pdf <= 0.0 {
+        return false;
+    }
+    (*path).throughput = throughput * next.weight;
+    let wi = to_world(local, next.wi);
+    (*path).ray = Ray(offset_origin(surface.point, surface.normal, surface.slot, wi), wi, FAR);
+    (*path).bsdf_pdf = next.pdf;
+    (*path).bounce += 1u;
+
+    // Russian roulette.
+    let brightest = largest((*path).throughput);
+    if (*path).bounce <= dispatch.paths.z {
+        return brightest > 0.0;
+    }
+    let survival = min(brightest, RR_MAX_SURVIVAL);
+    if survival <= 0.0 || uniform1() >= survival {
+        return false;
+    }
+    (*path).throughput /= survival;
+    return true;
+}
+
 // Radiance along a camera ray, estimated by one path.
 fn radiance(camera_ray: Ray) -> PathSample {
-    var ray = camera_ray;
-    var throughput = vec3<f32>(1.0);
-    var total = vec3<f32>(0.0);
-    var rays = 0u;
-    var bounce = 0u;
-    // Negative for the camera ray, which has no competing light sample.
-    var bsdf_pdf = -1.0;
+    var path = begin_path(camera_ray);
     loop {
-        // Find the next vertex.
-        rays += 1u;
-        let hit = traverse(ray, false);
-        if hit.slot == NONE {
-            if dispatch.lights.z > 0u {
-                let light = environment_at(environment_pixel(normal_or(ray.direction, vec3<f32>(0.0))));
-                let weight = select(power_heuristic(bsdf_pdf, light.w * (1.0 - dispatch.emitter_fraction.x)), 1.0, bsdf_pdf < 0.0);
-                total += throughput * light.xyz * weight;
-            }
-            break;
-        }
-        let surface = surface_at(hit, ray);
-
-        // Add emission.
-        let wo = -normal_or(ray.direction, vec3<f32>(0.0));
-        let cos_emitter = dot(surface.normal, wo);
-        if cos_emitter > 0.0 && any(surface.emission != vec3<f32>(0.0)) {
-            let along = ray.direction * surface.t;
-            let light_pdf = dispatch.emitter_fraction.x * surface.emitter_pdf * dot(along, along) / cos_emitter;
-            let weight = select(power_heuristic(bsdf_pdf, light_pdf), 1.0, bsdf_pdf < 0.0);
-            total += throughput * surface.emission * weight;
-        }
-        if bounce >= dispatch.paths.y {
-            break;
-        }
-
-        // Next-event estimation.
-        let local = frame_around(surface.shading_normal * select(1.0, -1.0, cos_emitter < 0.0));
-        let local_wo = to_local(local, wo);
-        total += throughput * direct_light(surface, local, local_wo, &rays);
-
-        // Continue the path by sampling the BSDF.
-        let choice = uniform1();
-        let next = bsdf_sample(surface, local_wo, choice, uniform2());
-        if next.pdf <= 0.0 {
-            break;
-        }
-        throughput *= next.weight;
-        let wi = to_world(local, next.wi);
-        ray = Ray(offset_origin(surface.point, surface.normal, surface.slot, wi), wi, FAR);
-        bsdf_pdf = next.pdf;
-        bounce += 1u;
-
-        // Russian roulette.
-        if bounce > dispatch.paths.z {
-            let survival = min(largest(throughput), RR_MAX_SURVIVAL);
-            if survival <= 0.0 || uniform1() >= survival {
-                break;
-            }
-            throughput /= survival;
-        } else if largest(throughput) <= 0.0 {
+        if !extend(&path) {
             break;
         }
     }
-    let rejected = !is_finite(total);
-    return PathSample(select(total, vec3<f32>(0.0), rejected), rays, rejected);
+    return end_path(path);
 }

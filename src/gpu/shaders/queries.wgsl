@@ -10,6 +10,5 @@ fn trace(@builtin(global_invocation_id) id: vec3<u32>) {
     let start = rays[2u * index];
     let along = rays[2u * index + 1u];
     let hit = traverse(Ray(start.xyz, along.xyz, start.w), along.w != 0.0);
-    film[index - dispatch.paths.w].over = vec4<f32>(hit.t, hit.b1, hit.b2, 0.0);
-    film[index - dispatch.paths.w].counts = vec4<u32>(hit.index, 0u, 0u, 0u);
+    film[index - dispatch.paths.w] = vec4<u32>(bitcast<vec3<u32>>(vec3<f32>(hit.t, hit.b1, hit.b2)), hit.index);
 }
