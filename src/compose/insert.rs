@@ -6,7 +6,7 @@ use crate::compose::backdrop::{Backdrop, LayeredPixel};
 use crate::compose::placement::PlacedObject;
 use crate::compose::world::FurnishedScene;
 use crate::error::Result;
-use crate::gpu::{PairSums, Tracer, View};
+use crate::gpu::{PairSums, SAMPLES_AT_ONCE, Tracer, View};
 use crate::math::picture::Picture;
 use crate::math::rng::Stream;
 use crate::scene::geometry::Ray;
@@ -153,22 +153,26 @@ impl Insertion {
             return Ok(true);
         }
         let band = (BAND / width).max(1);
+        let (camera, options) = (self.backdrop.camera.clone(), self.options);
+        let view = View {
+            camera: &camera,
+            options: &options,
+            seed: self.seed,
+            frame: self.backdrop.frame,
+        };
         for first in (0..height).step_by(band) {
             if !go_on() {
                 return Ok(false);
             }
             let rows = first..(first + band).min(height);
             let taken = self.row_samples[rows.clone()].iter().copied().min();
-            let from = taken.unwrap_or(samples);
             let pixels = (first * width) as u32..(rows.end * width) as u32;
-            let view = View {
-                camera: &self.backdrop.camera,
-                options: &self.options,
-                seed: self.seed,
-                frame: self.backdrop.frame,
-            };
-            let added = tracer.pairs(&view, pixels, from..samples)?;
-            self.accumulate(rows, samples.saturating_sub(from), &added);
+            for from in (taken.unwrap_or(samples)..samples).step_by(SAMPLES_AT_ONCE as usize) {
+                let to = samples.min(from + SAMPLES_AT_ONCE);
+                tracer.pairs(&view, pixels.clone(), from..to, |_, added| {
+                    self.accumulate(rows.clone(), to - from, added);
+                })?;
+            }
         }
         Ok(true)
     }
@@ -176,18 +180,12 @@ impl Insertion {
     /// Adds `samples` new samples, summed in `added`, to a range of rows.
     fn accumulate(&mut self, rows: Range<usize>, samples: u32, added: &[PairSums]) {
         let width = self.width();
-        for (row, added) in rows.zip(added.chunks(width)) {
-            for (sums, pair) in self.pixels[row * width..].iter_mut().zip(added) {
-                sums.with += pair.with;
-                sums.without += pair.without;
-                sums.covered_with += pair.covered_with;
-                sums.covered_without += pair.covered_without;
-                sums.covered += pair.covered;
-                sums.changed |= pair.changed;
-                self.rays += u64::from(pair.rays);
-                self.rejected += u64::from(pair.rejected);
-            }
-            self.row_samples[row] += samples;
+        let sums = &mut self.pixels[rows.start * width..rows.end * width];
+        (sums.par_iter_mut().zip(added)).for_each(|(sum, added)| sum.add(added));
+        self.rays += added.iter().map(|sum| u64::from(sum.rays)).sum::<u64>();
+        self.rejected += (added.iter().map(|sum| u64::from(sum.rejected))).sum::<u64>();
+        for row in &mut self.row_samples[rows] {
+            *row += samples;
         }
     }
 

@@ -1,6 +1,7 @@
 //! The graphics card: selection of an adapter, its device, and its errors.
 
 use crate::error::{Error, Result};
+use crate::gpu::pipelines::{Checks, Pipelines};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -19,6 +20,8 @@ pub struct Card {
     name: String,
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
+    pub(super) pipelines: Arc<Pipelines>,
+    pub(super) checks: Checks,
     failure: Arc<Mutex<Option<String>>>,
 }
 
@@ -77,10 +80,21 @@ impl Card {
         }));
         Some(Self {
             name: adapter.get_info().name,
+            pipelines: Arc::new(Pipelines::new(&device)),
+            checks: Checks::Off,
             device,
             queue,
             failure,
         })
+    }
+
+    /// The same device with other checks in its shaders.
+    #[must_use]
+    pub fn with_checks(&self, checks: Checks) -> Self {
+        Self {
+            checks,
+            ..self.clone()
+        }
     }
 
     /// The adapter's name.

@@ -73,6 +73,17 @@ shared! {
         lights: [u32; 4],
         /// Probability of sampling an emitter of the mesh rather than the environment.
         emitter_fraction: [f32; 4],
+        /// Smallest coordinates of the environment's box, and 1 if there is one.
+        box_low: [f32; 4],
+        box_high: [f32; 4],
+        /// Up vector, and 1 if radiance from above the horizon differs.
+        above: [f32; 4],
+        /// Direction towards the sun, and the fraction of light samples of the environment that are drawn from it.
+        sun: [f32; 4],
+        /// Radiance of the sun, and its pdf per solid angle.
+        sun_light: [f32; 4],
+        /// That fraction in units of 2⁻⁵³, low and high word.
+        sun_choice: [u32; 4],
     }
 
     struct Material {
@@ -112,6 +123,7 @@ fn head(stack_size: u32) -> String {
         ("COUPLING_SCALE", coupling_scale() as f32),
         ("NORMAL_MARGIN", crate::transport::world::NORMAL_MARGIN),
         ("RR_MAX_SURVIVAL", RR_MAX_SURVIVAL),
+        ("SUN_RADIUS", crate::transport::sun::RADIUS),
     ] {
         let _ = writeln!(text, "const {name} = {value:e}f;");
     }

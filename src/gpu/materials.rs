@@ -50,9 +50,8 @@ impl Materials {
         all
     }
 
-    /// Adds the materials of an inserted object whose first triangle has index `first`; returns the index of its first material.
-    pub fn insert(&mut self, object: &Inserted<'_>, first: u32) -> u32 {
-        let index = self.materials.len() as u32;
+    /// Adds the materials of an inserted object whose first triangle has index `first`.
+    pub fn insert(&mut self, object: &Inserted<'_>, first: u32) {
         let normals = self.corners(object.corner_normals);
         let colors = self.corners(object.corner_colors);
         for material in object.materials {
@@ -62,7 +61,6 @@ impl Materials {
                 ..packed
             });
         }
-        index
     }
 
     /// Packs a material without emission.

@@ -4,8 +4,12 @@
 //! card       adapters, the device, its errors
 //! layout     the shader's source, and the structs and constants that it shares
 //! shaders/   the path tracer, in modules named as in `transport`
-//! scene      hierarchy, triangles, materials and lights in the shader's layout
-//! tracer     a scene on the card: pictures, pairs of pictures, single rays
+//! pipelines  the compiled shaders
+//! buffers    buffers on the card
+//! geometry   triangles and their hierarchy on the card
+//! materials  materials, and lights: both in the shader's layout
+//! tracer     a lit scene on the card: pictures, pairs of pictures, single rays
+//! film       the dispatches that fill the film buffer
 //! pace       the amount of work per dispatch
 //! ```
 //!
@@ -13,14 +17,20 @@
 //! WebGPU guarantees on Vulkan, Metal and DX12: eight storage buffers and no features. Every failure, including the loss of the
 //! device, is an error value, after which callers continue on the processor.
 
+mod buffers;
 mod card;
+mod film;
+mod geometry;
 mod layout;
 mod lights;
 mod materials;
 mod pace;
-mod scene;
+mod pipelines;
 mod tracer;
 
 pub use card::{Adapters, Card};
+pub use film::SAMPLES_AT_ONCE;
+pub use geometry::Geometry;
 pub use materials::Inserted;
+pub use pipelines::Checks;
 pub use tracer::{PairSums, Tracer, View};

@@ -1,30 +1,29 @@
-//! A scene on the card: pictures, pairs of pictures with and without inserted objects, single rays.
+//! A lit scene on the card: pictures, pairs of pictures with and without inserted objects, single rays.
 
 use crate::error::Result;
+use crate::gpu::buffers::{empty, storage};
 use crate::gpu::card::Card;
-use crate::gpu::layout::{
-    BINDINGS, Dispatch, FILM, INSERT, Kernel, Material, NONE, RENDER, TRACE, WORKGROUP, source,
-};
-use crate::gpu::materials::Inserted;
+use crate::gpu::film::FilmBuffers;
+use crate::gpu::geometry::Geometry;
+use crate::gpu::layout::{Dispatch, INSERT, NONE, RENDER, TRACE};
+use crate::gpu::lights::{emitters, environment};
+use crate::gpu::materials::{Inserted, Materials};
 use crate::gpu::pace::Pace;
-use crate::gpu::scene::Packed;
 use crate::math::rng::splitmix64;
 use crate::scene::camera::Camera;
 use crate::scene::geometry::{Hit, Ray};
+use crate::transport::arrival::RayCount;
 use crate::transport::film::Film;
 use crate::transport::lit::LitScene;
 use crate::transport::path::PathOptions;
-use crate::transport::surroundings::Surroundings;
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 use std::ops::Range;
-use std::time::Instant;
+use std::sync::Arc;
 use wgpu::BufferUsages as Usage;
 
-/// Samples summed in f32 on the card before the sums are added in f64.
-const CHUNK: u32 = 16;
-
 /// Four numbers of the film buffer, as their bits.
-type Word = [u32; 4];
+pub(super) type Word = [u32; 4];
 
 /// A camera and how its paths are traced.
 #[derive(Debug, Clone, Copy)]
@@ -60,17 +59,50 @@ pub struct PairSums {
     pub rejected: u32,
 }
 
-/// A scene on the card.
+impl PairSums {
+    /// From the words of [`INSERT`].
+    fn from_words(words: &[Word]) -> Self {
+        let [with, without, covered_with, covered_without, counts] = words else {
+            return Self::default();
+        };
+        let sums = |&[r, g, b, _]: &Word| color([r, g, b]);
+        Self {
+            with: sums(with),
+            without: sums(without),
+            covered_with: sums(covered_with),
+            covered_without: sums(covered_without),
+            covered: f32::from_bits(with[3]) as u32,
+            rays: counts[0],
+            rejected: counts[1],
+            changed: counts[2] > 0,
+        }
+    }
+
+    /// Adds the sums over more samples.
+    pub fn add(&mut self, other: &Self) {
+        self.with += other.with;
+        self.without += other.without;
+        self.covered_with += other.covered_with;
+        self.covered_without += other.covered_without;
+        self.covered += other.covered;
+        self.changed |= other.changed;
+        self.rays += other.rays;
+        self.rejected += other.rejected;
+    }
+}
+
+/// A lit scene on the card.
 #[derive(Debug)]
 pub struct Tracer {
-    card: Card,
-    scene: Vec<wgpu::Buffer>,
-    dispatch: wgpu::Buffer,
+    pub(super) card: Card,
+    pub(super) geometry: Arc<Geometry>,
+    /// Materials, their data, emitters and environment.
+    pub(super) light: [wgpu::Buffer; 4],
+    pub(super) rays: wgpu::Buffer,
+    pub(super) dispatch: wgpu::Buffer,
     description: Dispatch,
-    layout: wgpu::BindGroupLayout,
-    shader: wgpu::ShaderModule,
-    pipelines: Vec<(Kernel, wgpu::ComputePipeline)>,
-    pace: Pace,
+    pub(super) film: Option<FilmBuffers>,
+    pub(super) pace: Pace,
 }
 
 impl Tracer {
@@ -79,81 +111,55 @@ impl Tracer {
     /// # Errors
     /// The scene does not fit, or the card failed.
     pub fn new(card: &Card, lit: &LitScene, objects: &[Inserted<'_>]) -> Result<Self> {
-        if (lit.outside.as_ref()).is_some_and(|map| map.surroundings() != Surroundings::Far) {
-            return Err(card
-                .failed("an environment on a box is supported on the processor only".to_owned()));
+        let geometry = Geometry::new(card, &lit.scene, objects)?;
+        Self::on(card, Arc::new(geometry), lit, objects)
+    }
+
+    /// Uploads the light and materials of a scene whose triangles are on the card, with the same inserted objects.
+    ///
+    /// # Errors
+    /// They do not fit, or the card failed.
+    pub fn on(
+        card: &Card,
+        geometry: Arc<Geometry>,
+        lit: &LitScene,
+        objects: &[Inserted<'_>],
+    ) -> Result<Self> {
+        let mut materials = Materials::new(lit);
+        let mut first = lit.scene.triangles.len() as u32;
+        for object in objects {
+            materials.insert(object, first);
+            first += object.corners.len() as u32;
         }
-        let packed = Packed::new(lit, objects);
-        let contents: [&[u8]; 7] = [
-            bytemuck::cast_slice(&packed.nodes),
-            bytemuck::cast_slice(&packed.triangles),
-            bytemuck::cast_slice(&packed.materials),
-            bytemuck::cast_slice(&packed.data),
-            bytemuck::cast_slice(&packed.emitters),
-            bytemuck::cast_slice(&packed.environment),
-            // No rays yet.
-            &[],
-        ];
-        let device = &card.device;
-        for (bytes, (name, _)) in contents.iter().zip(BINDINGS) {
-            if bytes.len() as u64 > card.max_buffer() {
-                let size = bytes.len() >> 20;
-                let max = card.max_buffer() >> 20;
-                return Err(card.failed(format!(
-                    "the scene's {name} take {size} MiB, but a buffer may have {max}"
-                )));
-            }
-        }
-        let mut scene = Vec::with_capacity(contents.len());
-        for bytes in contents {
-            scene.push(storage(card, bytes)?);
-        }
-        let (layout, shader) = card.attempt(|| {
-            let text = source(packed.stack_size);
-            let shader = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-                label: Some("paths"),
-                source: wgpu::ShaderSource::Wgsl(text.into()),
-            });
-            (bind_group_layout(device), shader)
-        })?;
+        let (emitters, count) = emitters(lit, &geometry.slot_of);
+        let outside = lit.outside.as_deref().map(environment);
+        let (environment, mut description) = outside.unwrap_or_default();
+        description.lights[0] = count;
+        description.emitter_fraction[0] = lit.emitter_fraction();
         let size = size_of::<Dispatch>() as u64;
         Ok(Self {
-            card: card.clone(),
-            scene,
-            dispatch: buffer(card, "dispatch", size, Usage::UNIFORM | Usage::COPY_DST)?,
-            description: packed.dispatch,
-            layout,
-            shader,
-            pipelines: Vec::new(),
+            light: [
+                storage(card, "materials", &materials.materials)?,
+                storage(card, "textures", &materials.data)?,
+                storage(card, "emitters", &emitters)?,
+                storage(card, "environment", &environment)?,
+            ],
+            rays: storage::<Word>(card, "rays", &[])?,
+            dispatch: empty(card, "dispatch", size, Usage::UNIFORM | Usage::COPY_DST)?,
+            description,
+            geometry,
+            film: None,
             pace: Pace::default(),
+            card: card.clone(),
         })
     }
 
-    /// Adds `samples` paths to every pixel of a film, keyed as in [`Film::add`]; after an error the film is unchanged.
-    ///
-    /// # Errors
-    /// The card failed.
-    pub fn add(&mut self, film: &mut Film, view: &View<'_>, samples: u32) -> Result<()> {
-        let mut added = Film::new(view.camera);
-        let pixels = 0..added.sums.len() as u32;
-        let range = film.samples..film.samples + samples;
-        let description = with_view(self.description, view);
-        self.dispatch_all(RENDER, description, pixels, range, |pixel, found| {
-            let [r, g, b, counts] = found[0];
-            added.sums[pixel as usize] += color([r, g, b]);
-            added.rays += u64::from(counts & 0x00ff_ffff);
-            added.rejected += u64::from(counts >> 24);
-        })?;
-        for (sum, added) in film.sums.iter_mut().zip(added.sums) {
-            *sum += added;
-        }
-        film.rays += added.rays;
-        film.rejected += added.rejected;
-        film.samples += samples;
-        Ok(())
+    /// The triangles, for a tracer of the same scene and objects in other light.
+    pub fn geometry(&self) -> &Arc<Geometry> {
+        &self.geometry
     }
 
-    /// A picture from `samples` paths per pixel.
+    /// A picture from `samples` paths per pixel, keyed as in [`Film::add`].
     ///
     /// # Errors
     /// The card failed.
@@ -163,7 +169,50 @@ impl Tracer {
         Ok(film)
     }
 
-    /// Traces pairs of paths with and without the inserted objects, for ranges of pixels and samples.
+    /// Adds `samples` paths to every pixel of a film, keyed as in [`Film::add`]. After an error the film is invalid.
+    ///
+    /// # Errors
+    /// The card failed.
+    pub fn add(&mut self, film: &mut Film, view: &View<'_>, samples: u32) -> Result<()> {
+        let range = film.samples..film.samples + samples;
+        let cast = self.accumulate(view, range, &mut film.sums)?;
+        film.rays += cast.rays;
+        film.rejected += cast.rejected;
+        film.samples += samples;
+        Ok(())
+    }
+
+    /// Adds a range of samples to the sum of each pixel. After an error sums of up to [`crate::gpu::SAMPLES_AT_ONCE`] samples that fit in one
+    /// buffer are unchanged, others invalid.
+    ///
+    /// # Errors
+    /// The card failed.
+    pub fn accumulate(
+        &mut self,
+        view: &View<'_>,
+        samples: Range<u32>,
+        sums: &mut [DVec3],
+    ) -> Result<RayCount> {
+        let mut cast = RayCount::default();
+        let description = with_view(self.description, view);
+        let pixels = 0..sums.len() as u32;
+        self.dispatch_all(RENDER, description, pixels, samples, |pixels, words| {
+            let sums = &mut sums[pixels.start as usize..pixels.end as usize];
+            let add = |(sum, &[r, g, b, counts]): (&mut DVec3, &Word)| {
+                *sum += color([r, g, b]);
+                RayCount {
+                    rays: u64::from(counts & 0x00ff_ffff),
+                    rejected: u64::from(counts >> 24),
+                }
+            };
+            let added: RayCount = sums.par_iter_mut().zip(words).map(add).sum();
+            cast += added;
+        })?;
+        Ok(cast)
+    }
+
+    /// Traces pairs of paths with and without the inserted objects, and calls `add` with ranges of the pixels and their sums of up
+    /// to [`crate::gpu::SAMPLES_AT_ONCE`] samples.
     ///
     /// # Errors
     /// The card failed.
@@ -172,26 +221,14 @@ impl Tracer {
         view: &View<'_>,
         pixels: Range<u32>,
         samples: Range<u32>,
-    ) -> Result<Vec<PairSums>> {
-        let first = pixels.start;
-        let mut sums = vec![PairSums::default(); pixels.len()];
+        mut add: impl FnMut(Range<u32>, &[PairSums]),
+    ) -> Result<()> {
         let description = with_view(self.description, view);
-        self.dispatch_all(INSERT, description, pixels, samples, |pixel, found| {
-            let sum = &mut sums[(pixel - first) as usize];
-            let [with, without, covered_with, covered_without, counts] = found else {
-                return;
-            };
-            let sums = |&[r, g, b, _]: &Word| color([r, g, b]);
-            sum.with += sums(with);
-            sum.without += sums(without);
-            sum.covered_with += sums(covered_with);
-            sum.covered_without += sums(covered_without);
-            sum.covered += f32::from_bits(with[3]) as u32;
-            sum.rays += counts[0];
-            sum.rejected += counts[1];
-            sum.changed |= counts[2] > 0;
-        })?;
-        Ok(sums)
+        self.dispatch_all(INSERT, description, pixels, samples, |pixels, words| {
+            let words = words.par_chunks_exact(INSERT.words as usize);
+            let sums: Vec<PairSums> = words.map(PairSums::from_words).collect();
+            add(pixels, &sums);
+        })
     }
 
     /// The nearest hit of each ray, or any hit if `any`. Triangles of inserted objects count after the scene's; `t_min` is ignored.
@@ -205,168 +242,25 @@ impl Tracer {
             [ray.origin.extend(end), ray.direction.extend(flag)]
         });
         let words: Vec<[f32; 4]> = words.map(|v| v.to_array()).collect();
-        let bytes: &[u8] = bytemuck::cast_slice(&words);
-        if bytes.len() as u64 > self.card.max_buffer() {
-            return Err(self.card.failed("too many rays at once".to_owned()));
-        }
-        let buffer = storage(&self.card, bytes)?;
-        if let Some(place) = self.scene.last_mut() {
-            *place = buffer;
-        }
-        let mut hits = vec![None; rays.len()];
+        self.rays = storage(&self.card, "rays", &words)?;
+        // The film buffer's bindings hold the earlier rays.
+        self.film = None;
+        let mut hits = Vec::with_capacity(rays.len());
         let mut description = self.description;
         description.slice[0] = rays.len().max(1) as u32;
         let all = 0..rays.len() as u32;
-        self.dispatch_all(TRACE, description, all, 0..1, |ray, found| {
-            let [t, b1, b2, triangle] = found[0];
-            let [t, b1, b2] = [t, b1, b2].map(f32::from_bits);
-            hits[ray as usize] = (triangle != NONE).then_some(Hit {
-                t,
-                triangle,
-                b1,
-                b2,
-            });
+        self.dispatch_all(TRACE, description, all, 0..1, |_, words| {
+            hits.par_extend(words.par_iter().map(|&[t, b1, b2, triangle]| {
+                let [t, b1, b2] = [t, b1, b2].map(f32::from_bits);
+                (triangle != NONE).then_some(Hit {
+                    t,
+                    triangle,
+                    b1,
+                    b2,
+                })
+            }));
         })?;
         Ok(hits)
-    }
-
-    /// Traces samples of pixels in bands and chunks; `add` gets the sums of up to [`CHUNK`] samples of each pixel.
-    fn dispatch_all(
-        &mut self,
-        kernel: Kernel,
-        mut description: Dispatch,
-        pixels: Range<u32>,
-        samples: Range<u32>,
-        mut add: impl FnMut(u32, &[Word]),
-    ) -> Result<()> {
-        let pipeline = self.pipeline(kernel)?;
-        let pixel_size = u64::from(kernel.words) * size_of::<Word>() as u64;
-        let fit = (self.card.max_buffer() / pixel_size).min(u64::from(u32::MAX));
-        let band = (fit as u32).min(pixels.len() as u32).max(1);
-        let card = self.card.clone();
-        let size = u64::from(band) * pixel_size;
-        let film = Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST;
-        let film = buffer(&card, FILM, size, film)?;
-        let read = buffer(&card, FILM, size, Usage::MAP_READ | Usage::COPY_DST)?;
-        let group = card.attempt(|| self.bind_group(&film))?;
-        for first in pixels.clone().step_by(band as usize) {
-            let band = first..first.saturating_add(band).min(pixels.end);
-            for chunk in samples.clone().step_by(CHUNK as usize) {
-                let end = chunk.saturating_add(CHUNK).min(samples.end);
-                clear(&card, &film);
-                description.paths[3] = band.start;
-                self.slices(&pipeline, &group, description, band.clone(), chunk..end)?;
-                let found = self.read(&film, &read, band.len() * kernel.words as usize)?;
-                for (pixel, found) in band.clone().zip(found.chunks_exact(kernel.words as usize)) {
-                    add(pixel, found);
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Submits the dispatches that add a range of samples of a band to the film buffer.
-    fn slices(
-        &mut self,
-        pipeline: &wgpu::ComputePipeline,
-        group: &wgpu::BindGroup,
-        mut description: Dispatch,
-        band: Range<u32>,
-        samples: Range<u32>,
-    ) -> Result<()> {
-        let (mut pixel, mut sample) = (band.start, samples.start);
-        while sample < samples.end && !band.is_empty() {
-            let left = samples.end - sample;
-            let [count, fit] = self.pace.slice(band.len() as u32, left);
-            let taken = if pixel == band.start { fit } else { 1 };
-            let end = pixel.saturating_add(count).min(band.end);
-            (description.slice[1], description.slice[2]) = (pixel, end);
-            (description.slice[3], description.paths[0]) = (sample, taken);
-            let card = &self.card;
-            card.queue
-                .write_buffer(&self.dispatch, 0, bytemuck::bytes_of(&description));
-            let mut encoder = card.device.create_command_encoder(&Default::default());
-            {
-                let mut pass = encoder.begin_compute_pass(&Default::default());
-                pass.set_pipeline(pipeline);
-                pass.set_bind_group(0, group, &[]);
-                pass.dispatch_workgroups((end - pixel).div_ceil(WORKGROUP), 1, 1);
-            }
-            let start = Instant::now();
-            let submission = card.queue.submit([encoder.finish()]);
-            card.wait(submission)?;
-            self.pace.record((end - pixel) * taken, start.elapsed());
-            pixel = end;
-            if pixel == band.end {
-                (pixel, sample) = (band.start, sample + taken);
-            }
-        }
-        Ok(())
-    }
-
-    fn read(&self, film: &wgpu::Buffer, read: &wgpu::Buffer, words: usize) -> Result<Vec<Word>> {
-        let bytes = (words * size_of::<Word>()) as u64;
-        let card = &self.card;
-        let mut encoder = card.device.create_command_encoder(&Default::default());
-        encoder.copy_buffer_to_buffer(film, 0, read, 0, bytes);
-        let submission = card.queue.submit([encoder.finish()]);
-        let (send, receive) = std::sync::mpsc::sync_channel(1);
-        read.map_async(wgpu::MapMode::Read, 0..bytes, move |mapped| {
-            let _ = send.send(mapped.is_ok());
-        });
-        card.wait(submission)?;
-        let failed = || card.failed("its results cannot be read back".to_owned());
-        if !receive.try_recv().unwrap_or(false) {
-            return Err(failed());
-        }
-        let view = read.get_mapped_range(0..bytes).map_err(|_| failed())?;
-        let mut found = vec![Word::default(); words];
-        bytemuck::cast_slice_mut(&mut found).copy_from_slice(&view);
-        drop(view);
-        read.unmap();
-        Ok(found)
-    }
-
-    fn bind_group(&self, film: &wgpu::Buffer) -> wgpu::BindGroup {
-        let buffers = std::iter::once(&self.dispatch).chain(&self.scene);
-        let entries: Vec<wgpu::BindGroupEntry<'_>> = (0..)
-            .zip(buffers.chain([film]))
-            .map(|(binding, buffer)| wgpu::BindGroupEntry {
-                binding,
-                resource: buffer.as_entire_binding(),
-            })
-            .collect();
-        let device = &self.card.device;
-        device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("scene"),
-            layout: &self.layout,
-            entries: &entries,
-        })
-    }
-
-    /// The pipeline of a kernel, compiled at first use.
-    fn pipeline(&mut self, kernel: Kernel) -> Result<wgpu::ComputePipeline> {
-        if let Some((_, pipeline)) = self.pipelines.iter().find(|(k, _)| *k == kernel) {
-            return Ok(pipeline.clone());
-        }
-        let device = &self.card.device;
-        let pipeline = self.card.attempt(|| {
-            let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: Some("paths"),
-                bind_group_layouts: &[Some(&self.layout)],
-                ..Default::default()
-            });
-            device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some(kernel.name),
-                layout: Some(&layout),
-                module: &self.shader,
-                entry_point: Some(kernel.name),
-                compilation_options: Default::default(),
-                cache: None,
-            })
-        })?;
-        self.pipelines.push((kernel, pipeline.clone()));
-        Ok(pipeline)
     }
 }
 
@@ -391,55 +285,4 @@ fn with_view(scene: Dispatch, view: &View<'_>) -> Dispatch {
         paths: [0, view.options.max_bounces, view.options.rr_depth, 0],
         ..scene
     }
-}
-
-/// Creates a read-only storage buffer.
-fn storage(card: &Card, bytes: &[u8]) -> Result<wgpu::Buffer> {
-    /// Content of empty buffers: a binding must hold at least one element.
-    const NOTHING: [u8; size_of::<Material>()] = [0; size_of::<Material>()];
-    let bytes = if bytes.is_empty() { &NOTHING } else { bytes };
-    let usage = Usage::STORAGE | Usage::COPY_DST;
-    let buffer = buffer(card, "scene", bytes.len() as u64, usage)?;
-    card.attempt(|| card.queue.write_buffer(&buffer, 0, bytes))?;
-    Ok(buffer)
-}
-
-fn buffer(card: &Card, label: &str, size: u64, usage: Usage) -> Result<wgpu::Buffer> {
-    card.attempt(|| {
-        card.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(label),
-            size,
-            usage,
-            mapped_at_creation: false,
-        })
-    })
-}
-
-fn clear(card: &Card, film: &wgpu::Buffer) {
-    let mut encoder = card.device.create_command_encoder(&Default::default());
-    encoder.clear_buffer(film, 0, None);
-    card.queue.submit([encoder.finish()]);
-}
-
-fn bind_group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: wgpu::ShaderStages::COMPUTE,
-        ty: wgpu::BindingType::Buffer {
-            ty,
-            has_dynamic_offset: false,
-            min_binding_size: None,
-        },
-        count: None,
-    };
-    let mut entries = vec![entry(0, wgpu::BufferBindingType::Uniform)];
-    for (binding, (name, _)) in (1..).zip(BINDINGS) {
-        let read_only = name != FILM;
-        let storage = wgpu::BufferBindingType::Storage { read_only };
-        entries.push(entry(binding, storage));
-    }
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("scene"),
-        entries: &entries,
-    })
 }

@@ -84,8 +84,7 @@ impl Environment {
     /// Radiance along a ray that leaves the mesh.
     pub fn radiance(&self, origin: Vec3, direction: Vec3) -> Vec3 {
         let pixel = self.pixel(origin, direction);
-        let is_open = (self.openings.as_ref()).is_none_or(|open| open[pixel]);
-        let sun = self.sun.filter(|_| is_open);
+        let sun = self.sun.filter(|_| self.is_open(pixel));
         self.pixels_from(direction)[pixel] + sun.map_or(Vec3::ZERO, |sun| sun.radiance(direction))
     }
 
@@ -135,8 +134,24 @@ impl Environment {
             .map_or(map, |sun| map + (sun.pdf(direction) - map) * share)
     }
 
+    /// Radiance of each pixel from above the horizon, if it differs, and the up vector.
+    pub fn above(&self) -> Option<(&[Vec3], Vec3)> {
+        let above = self.above.as_ref();
+        above.map(|(pixels, up)| (pixels.as_slice(), *up))
+    }
+
+    /// The sun beside the map.
+    pub fn sun(&self) -> Option<Sun> {
+        self.sun
+    }
+
+    /// Whether the sun shines through a pixel.
+    pub fn is_open(&self, pixel: usize) -> bool {
+        (self.openings.as_ref()).is_none_or(|open| open[pixel])
+    }
+
     /// Fraction of the samples that are drawn from the sun: its share of the power.
-    fn sun_share(&self) -> f64 {
+    pub fn sun_share(&self) -> f64 {
         match self.sun_power() {
             0.0 => 0.0,
             sun => sun / self.power(),

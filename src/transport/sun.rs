@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::f32::consts::PI;
 
 /// Angular radius of the sun's disc in radians.
-const RADIUS: f32 = 4.65e-3;
+pub const RADIUS: f32 = 4.65e-3;
 
 /// A disc of even radiance, infinitely far.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -19,7 +19,7 @@ pub struct Sun {
 
 impl Sun {
     /// Solid angle of the disc in steradians.
-    const SOLID_ANGLE: f32 = PI * RADIUS * RADIUS;
+    pub const SOLID_ANGLE: f32 = PI * RADIUS * RADIUS;
 
     /// Radiance from a unit direction; black beside the disc.
     pub fn radiance(&self, direction: Vec3) -> Vec3 {

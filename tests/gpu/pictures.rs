@@ -3,7 +3,7 @@
 use crate::card;
 use crate::scenes::{capture, checkerboard, closed_box, lamp_room, room_views, without};
 use glam::{DVec3, Vec3};
-use relit::gpu::{Tracer, View};
+use relit::gpu::{Checks, Tracer, View};
 use relit::room::Room;
 use relit::scene::Scene;
 use relit::scene::camera::Camera;
@@ -13,6 +13,8 @@ use relit::transport::film::Film;
 use relit::transport::lit::LitScene;
 use relit::transport::material::{Albedo, Lobe, Material, TexelColors};
 use relit::transport::path::PathOptions;
+use relit::transport::sun::Sun;
+use relit::transport::surroundings::Surroundings;
 use std::sync::Arc;
 
 /// Samples a pixel.
@@ -91,6 +93,32 @@ fn the_built_in_room_is_the_processors() {
     agree("built-in room", &lit, &lit.scene.cameras[1].shrunk(48));
 }
 
+/// The shader without checks of its indices is the one with them.
+#[test]
+fn unchecked_pictures_are_the_checked_ones() {
+    let Some(card) = card() else { return };
+    let lit = Room::new().lit([64, 48]).expect("the room is sound");
+    let view = View {
+        camera: &lit.scene.cameras[1],
+        options: &PathOptions::default(),
+        seed: 3,
+        frame: 1,
+    };
+    let [on, off] = [Checks::On, Checks::Off].map(|checks| {
+        let card = card.with_checks(checks);
+        let mut tracer = Tracer::new(&card, &lit, &[]).expect("the room fits");
+        tracer.film(&view, 4).expect("the card works").mean()
+    });
+    let pairs = on.iter().zip(&off);
+    let alike = |(a, b): &(&Vec3, &Vec3)| {
+        let difference = (**a - **b).abs().max_element();
+        difference <= 1e-3 * a.max_element().max(1e-6)
+    };
+    let alike = pairs.filter(alike).count();
+    println!("{alike} of {} pixels alike", on.len());
+    assert!(alike as f64 > 0.98 * on.len() as f64);
+}
+
 #[test]
 fn a_room_with_a_lamp_and_a_block_is_the_processors() {
     let (mesh, materials) = lamp_room();
@@ -159,6 +187,40 @@ fn an_open_room_with_light_from_outside_is_the_processors() {
     });
     let lit = LitScene::new(lit.scene.clone(), dark.collect(), lit.outside.clone());
     agree("open room without a lamp", &lit, &lit.scene.cameras[4]);
+}
+
+/// The light of real scans: on a box around the mesh, other from above the horizon, with a sun that shines through some pixels.
+#[test]
+fn light_from_a_box_and_a_sun_is_the_processors() {
+    let (mesh, materials) = lamp_room();
+    let ceiling = mesh.objects[3].clone();
+    let (mesh, materials) = without((mesh, materials), &[&ceiling]);
+    let mut lit = room_of(mesh, materials);
+    let corners = lit.scene.positions.iter().copied();
+    let around = Surroundings::around(corners).expect("points");
+    let map = |bright: f32| {
+        let pixel = |i: usize| Vec3::new(0.2, 0.3, 0.6) * (i % 3) as f32 * bright;
+        Environment::new(16, 8, (0..16 * 8).map(pixel).collect()).expect("sizes fit")
+    };
+    let above: Vec<Vec3> = map(3.0).pixels().to_vec();
+    let sun = Sun {
+        direction: Vec3::new(0.3, 0.9, 0.2).normalize(),
+        irradiance: Vec3::new(4.0, 3.0, 2.0),
+    };
+    let openings = (0..16 * 8).map(|i| i % 4 != 1).collect();
+    let boxed = map(1.0).around(around);
+    let divided = (boxed.clone().with_above(above, Vec3::Y)).expect("sizes fit");
+    let sunny = divided.clone().with_sun(Some(sun), Some(openings));
+    let sky = map(1.0).with_sun(Some(sun), None);
+    for (name, map) in [
+        ("box", boxed),
+        ("box with a horizon", divided),
+        ("box with a sun", sunny.expect("sizes fit")),
+        ("sky with a sun", sky.expect("sizes fit")),
+    ] {
+        lit.outside = Some(Arc::new(map));
+        agree(name, &lit, &lit.scene.cameras[0]);
+    }
 }
 
 /// Two lamps of very unequal strength, one of them of slivers.

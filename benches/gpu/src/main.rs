@@ -1,4 +1,4 @@
-//! Rays and paths by a graphics card beside the processor's, in one run: the same rays, the same pictures.
+//! Rays, paths and pictures by a graphics card beside the processor's, in one run: the same rays, the same pictures.
 //!
 //! `cargo run --release [-- cards|any [RAYS [SAMPLES [RUNS]]]]`; `any` takes a software adapter too. Figures are medians over paired runs
 //! of wall time, on all threads of the processor; the card's hold the transfer of rays and hits.
@@ -14,6 +14,7 @@ use relit::capture::photograph::{Encoding, Photograph, PhotographSource};
 use relit::capture::{Capture, Frame};
 use relit::gpu::{Adapters, Card, Tracer, View};
 use relit::room::Room;
+use relit::scene::camera::Camera;
 use relit::scene::geometry::Ray;
 use relit::transport::film::Film;
 use relit::transport::lit::LitScene;
@@ -53,7 +54,10 @@ fn main() {
     ] {
         rays_a_second(&card, scene, rays, runs);
     }
-    paths_a_second(&card, samples as u32, runs);
+    let room = Room::new().lit([320, 240]).expect("the room is sound");
+    paths_a_second(&card, &room, samples as u32, runs);
+    seconds_to_a_picture(&card, &room, samples as u32, runs);
+    frames_a_second(&card, &room, runs);
 }
 
 /// Nearest hits of bounces and any hits towards a lamp.
@@ -92,26 +96,15 @@ fn rays_a_second(card: &Card, mut scene: Scene, count: usize, runs: usize) {
     }
 }
 
+/// Seed of all pictures.
+const SEED: u64 = 1;
+
 /// Full paths of a view of the built-in room.
-fn paths_a_second(card: &Card, samples: u32, runs: usize) {
-    let lit = Room::new().lit([320, 240]).expect("the room is sound");
+fn paths_a_second(card: &Card, lit: &LitScene, samples: u32, runs: usize) {
     let camera = &lit.scene.cameras[0];
-    let options = PathOptions::default();
-    let view = View {
-        camera,
-        options: &options,
-        seed: 1,
-        frame: 0,
-    };
-    let mut tracer = Tracer::new(card, &lit, &[]).expect("the room fits");
-    let pixels = f64::from(camera.intrinsics.width * camera.intrinsics.height);
-    let by_card = || tracer.film(&view, samples).expect("the card works").rays as usize;
-    let by_processor = || {
-        let mut film = Film::new(camera);
-        film.add(&lit, camera, &options, 1, 0, samples);
-        film.rays as usize
-    };
-    let work = pixels * f64::from(samples) * 1e-6;
+    let mut painters = Painters::new(card, lit, camera);
+    let work = camera.pixels() as f64 * f64::from(samples) * 1e-6;
+    let [by_card, by_processor] = painters.each(samples);
     let figures = paired(runs, work, by_card, by_processor);
     let triangles = lit.scene.triangles.len();
     row(
@@ -121,6 +114,109 @@ fn paths_a_second(card: &Card, samples: u32, runs: usize) {
         "Mpaths/s",
         figures,
     );
+}
+
+/// Pictures a second with an error of 1 % of their mean, from the time of `samples` samples a pixel and the difference between two
+/// independent pictures.
+fn seconds_to_a_picture(card: &Card, lit: &LitScene, samples: u32, runs: usize) {
+    let camera = &lit.scene.cameras[0];
+    let options = PathOptions::default();
+    let picture = |seed| {
+        let mut film = Film::new(camera);
+        film.add(lit, camera, &options, seed, 0, samples);
+        film.mean()
+    };
+    let [a, b] = [SEED, SEED + 1].map(picture);
+    let pairs = a.iter().zip(&b);
+    let square: f64 = (pairs.clone())
+        .map(|(a, b)| f64::from((*a - *b).length_squared()))
+        .sum();
+    let mean: f64 = pairs.map(|(a, b)| f64::from((*a + *b).element_sum())).sum();
+    let count = 3.0 * a.len() as f64;
+    // The difference has twice the variance of one picture.
+    let error = (0.5 * square / count).sqrt() / (0.5 * mean / count);
+    let times = (error / 0.01).powi(2);
+    let mut painters = Painters::new(card, lit, camera);
+    let [by_card, by_processor] = painters.each(samples);
+    let figures = paired(runs, 1.0 / times, by_card, by_processor);
+    let what = format!(
+        "pictures of 1 % error ({:.0} samples)",
+        times * f64::from(samples)
+    );
+    row(
+        "built-in room",
+        lit.scene.triangles.len(),
+        &what,
+        "1/s",
+        figures,
+    );
+}
+
+/// Frames a second of 1280 × 800 pixels with one sample each.
+fn frames_a_second(card: &Card, lit: &LitScene, runs: usize) {
+    const FRAMES: usize = 8;
+    let mut camera = lit.scene.cameras[0].clone();
+    let grow = 1280.0 / f64::from(camera.intrinsics.width);
+    let k = &mut camera.intrinsics;
+    (k.width, k.height) = (1280, 800);
+    (k.fx, k.fy, k.cx, k.cy) = (k.fx * grow, k.fy * grow, 640.0, 400.0);
+    let mut painters = Painters::new(card, lit, &camera);
+    let [mut by_card, mut by_processor] = painters.each(1);
+    let frames = |paint: &mut dyn FnMut() -> usize| (0..FRAMES).map(|_| paint()).sum();
+    let by_card = || frames(&mut *by_card);
+    let by_processor = || frames(&mut *by_processor);
+    let figures = paired(runs, FRAMES as f64, by_card, by_processor);
+    let what = "frames of 1280 × 800, 1 sample";
+    row(
+        "built-in room",
+        lit.scene.triangles.len(),
+        what,
+        "1/s",
+        figures,
+    );
+}
+
+/// The same pictures by card and processor.
+struct Painters<'a> {
+    tracer: Tracer,
+    lit: &'a LitScene,
+    camera: &'a Camera,
+    options: PathOptions,
+}
+
+impl<'a> Painters<'a> {
+    fn new(card: &Card, lit: &'a LitScene, camera: &'a Camera) -> Self {
+        Self {
+            tracer: Tracer::new(card, lit, &[]).expect("the room fits"),
+            lit,
+            camera,
+            options: PathOptions::default(),
+        }
+    }
+
+    /// Both make a picture and return the number of its rays.
+    fn each(&mut self, samples: u32) -> [Box<dyn FnMut() -> usize + '_>; 2] {
+        let (lit, camera, options) = (self.lit, self.camera, &self.options);
+        let tracer = &mut self.tracer;
+        let by_card = move || {
+            let view = View {
+                camera,
+                options,
+                seed: SEED,
+                frame: 0,
+            };
+            let film = tracer.film(&view, samples).expect("the card works");
+            std::hint::black_box(film.mean());
+            film.rays as usize
+        };
+        let by_processor = move || {
+            let mut film = Film::new(camera);
+            film.add(lit, camera, options, SEED, 0, samples);
+            std::hint::black_box(film.mean());
+            film.rays as usize
+        };
+        [Box::new(by_card), Box::new(by_processor)]
+    }
 }
 
 fn row(scene: &str, triangles: usize, what: &str, unit: &str, [card, processor, ratio]: [f64; 3]) {
@@ -134,7 +230,7 @@ fn paired(
     runs: usize,
     work: f64,
     mut card: impl FnMut() -> usize,
-    processor: impl Fn() -> usize,
+    mut processor: impl FnMut() -> usize,
 ) -> [f64; 3] {
     let mut pairs = Vec::new();
     for run in 0..=runs {

@@ -108,7 +108,7 @@ fn extend(path: ptr<function, Path>) -> bool {
     let hit = traverse(ray, false);
     if hit.slot == NONE {
         if dispatch.lights.z > 0u {
-            let light = environment_at(environment_pixel(normal_or(ray.direction, vec3<f32>(0.0))));
+            let light = environment_at(ray.origin, normal_or(ray.direction, vec3<f32>(0.0)));
             let weight = select(power_heuristic(bsdf_pdf, light.w * (1.0 - dispatch.emitter_fraction.x)), 1.0, bsdf_pdf < 0.0);
             (*path).total += throughput * light.xyz * weight;
         }

@@ -1,46 +1,49 @@
-//! A lit scene with inserted objects in the shader's layout: triangles in the order of the hierarchy, materials, lights.
+//! The triangles of a scene and of inserted objects on the card, in the order of their hierarchy.
 
-use crate::gpu::layout::Material as Shared;
-use crate::gpu::layout::{Dispatch, NONE};
-use crate::gpu::lights::{emitters, environment};
-use crate::gpu::materials::{Inserted, Materials};
+use crate::error::Result;
+use crate::gpu::buffers::storage;
+use crate::gpu::card::Card;
+use crate::gpu::layout::{NONE, TRIANGLE_WORDS};
+use crate::gpu::materials::Inserted;
+use crate::scene::Scene;
 use crate::scene::bvh::Tree;
-use crate::transport::lit::LitScene;
 use glam::Vec3;
 
-/// The contents of a scene's storage buffers.
+/// Stack sizes are multiples of this, so that few shaders are compiled.
+const STACK_STEP: u32 = 16;
+
+/// Triangles and their hierarchy. The materials of a scene come one per object, then those of each inserted object.
 #[derive(Debug)]
-pub(super) struct Packed {
-    pub nodes: Vec<[u32; 4]>,
-    pub triangles: Vec<[u32; 4]>,
-    pub materials: Vec<Shared>,
-    pub data: Vec<u32>,
-    pub emitters: Vec<[u32; 4]>,
-    pub environment: Vec<[u32; 4]>,
+pub struct Geometry {
+    pub(super) nodes: wgpu::Buffer,
+    pub(super) triangles: wgpu::Buffer,
+    /// The place of each triangle in `triangles`; [`NONE`] for those that cannot be hit.
+    pub(super) slot_of: Vec<u32>,
     /// Maximum number of stack entries of a traversal.
-    pub stack_size: u32,
-    /// The scene's part of the dispatch parameters; the rest is zero.
-    pub dispatch: Dispatch,
+    pub(super) stack_size: u32,
 }
 
-impl Packed {
-    pub fn new(lit: &LitScene, objects: &[Inserted<'_>]) -> Self {
-        let scene = &lit.scene;
+impl Geometry {
+    /// Builds the hierarchy and uploads both.
+    ///
+    /// # Errors
+    /// They do not fit, or the card failed.
+    pub fn new(card: &Card, scene: &Scene, objects: &[Inserted<'_>]) -> Result<Self> {
         let own = scene.triangles.len();
         let mut corners: Vec<[Vec3; 3]> = (0..own as u32).map(|t| scene.corners(t)).collect();
         let mut normals = scene.normals.clone();
         let mut material_of = scene.object_of.clone();
-        let mut materials = Materials::new(lit);
+        let mut materials = scene.objects.len() as u32;
         for object in objects {
-            let first = materials.insert(object, corners.len() as u32);
             corners.extend(object.corners);
             normals.extend(object.normals);
-            material_of.extend(object.material_of.iter().map(|m| first + m));
+            material_of.extend(object.material_of.iter().map(|m| materials + m));
+            materials += object.materials.len() as u32;
         }
 
         let tree = Tree::new(&corners);
         let mut slot_of = vec![NONE; corners.len()];
-        let mut triangles = Vec::with_capacity(4 * corners.len());
+        let mut triangles = Vec::with_capacity(TRIANGLE_WORDS * corners.len());
         for (slot, &index) in tree.order.iter().enumerate() {
             let t = index as usize;
             slot_of[t] = slot as u32;
@@ -50,25 +53,12 @@ impl Packed {
             triangles.push(word(c, u32::from(t >= own)));
             triangles.push(word(normals[t], 0));
         }
-
-        let (emitters, objects) = emitters(lit, &slot_of);
-        let outside = lit.outside.as_deref();
-        let [width, height] = outside.map_or([0; 2], |map| map.size().map(|n| n as u32));
-        let dispatch = Dispatch {
-            lights: [objects, 0, width, height],
-            emitter_fraction: [lit.emitter_fraction(), 0.0, 0.0, 0.0],
-            ..Dispatch::default()
-        };
-        Self {
-            nodes: nodes(&tree),
-            triangles,
-            materials: materials.materials,
-            data: materials.data,
-            emitters,
-            environment: outside.map(environment).unwrap_or_default(),
-            stack_size: tree.depth().max(1),
-            dispatch,
-        }
+        Ok(Self {
+            nodes: storage(card, "hierarchy", &nodes(&tree))?,
+            triangles: storage(card, "triangles", &triangles)?,
+            slot_of,
+            stack_size: tree.depth().max(1).next_multiple_of(STACK_STEP),
+        })
     }
 }
 
