@@ -4,6 +4,7 @@ mod common;
 
 use glam::{DVec3, Vec3};
 use relit::math::picture::Picture;
+use relit::render::{Device, Renderer};
 use relit::session::command::{OpenOptions, Placement, Source};
 use relit::session::edits::{Edits, ObjectEdit};
 use relit::session::insertion::Inserting;
@@ -29,6 +30,7 @@ fn work(edits: &Edits, placements: Vec<Placement>) -> Photographs {
         denoise: None,
         finish: true,
         frames: vec![0, 1],
+        renderer: Renderer::processor(),
     }
 }
 
@@ -148,7 +150,9 @@ fn the_screen_shows_what_the_files_hold() {
         inserting.show(1, u32::MAX);
         inserting.place(placements.to_vec());
         while inserting.is_busy() {
-            inserting.draw(&work.capture, &light).expect("drawn");
+            inserting
+                .draw(&work.renderer, &work.capture, &light)
+                .expect("drawn");
         }
         inserting.shown().expect("a composite")
     };
@@ -171,4 +175,43 @@ fn the_screen_shows_what_the_files_hold() {
     let brightest = brightest.fold(0.0, f32::max);
     let mean = error.sum::<f32>() / composite.pixels.len() as f32;
     assert!(mean < 0.01 * brightest, "{mean} of {brightest}");
+}
+
+/// Differences are those of rounding, which can send a path elsewhere.
+#[test]
+fn a_graphics_card_shows_the_processors_composite() {
+    let demanded = std::env::var_os("RELIT_REQUIRE_ADAPTER").is_some_and(|value| value == "1");
+    let by_card = match Renderer::find(Device::Gpu) {
+        Ok(renderer) => renderer,
+        Err(error) => {
+            assert!(!demanded, "{error}");
+            println!("skipped: no graphics adapter");
+            return;
+        }
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut work = work(&dimmed(0.5), vec![block(folder.path())]);
+    work.samples = 32;
+    let light = Light::new(work.found.clone(), work.edited.clone(), &work.settings);
+    let shown = |renderer: &Renderer| {
+        let mut inserting = Inserting::default();
+        inserting.show(1, u32::MAX);
+        inserting.place(work.placements.clone());
+        let samples = |inserting: &Inserting| inserting.shown().and_then(|shown| shown.samples);
+        while samples(&inserting).is_none_or(|samples| samples < work.samples) {
+            let drawn = inserting.draw(renderer, &work.capture, &light);
+            drawn.expect("drawn");
+            // The card gets objects that rest.
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        }
+        inserting.shown().expect("a composite").composite.clone()
+    };
+    let [a, b] = [&Renderer::processor(), &by_card].map(shown);
+    assert_eq!(by_card.take_warnings(), Vec::<String>::new());
+    assert_ne!(a.pixels, b.pixels, "the card did nothing");
+    let pairs = a.pixels.iter().zip(&b.pixels);
+    let alike = pairs.filter(|(a, b)| (**a - **b).abs().max_element() < 0.01);
+    let alike = alike.count() as f64 / a.pixels.len() as f64;
+    println!("{:.1} % of pixels alike", 100.0 * alike);
+    assert!(alike > 0.95, "{alike}");
 }

@@ -7,6 +7,7 @@ use crate::app::state::App;
 use crate::app::window::Window;
 use crate::error::{Error, Result, panic_message};
 use crate::inverse::settings::Settings;
+use crate::render::{Device, Renderer};
 use crate::session::Session;
 use crate::session::command::{Source, Start};
 use crate::session::worker::Backend;
@@ -21,7 +22,7 @@ static OPENED: AtomicBool = AtomicBool::new(false);
 ///
 /// # Errors
 /// There is no display, no library for it, or no graphics adapter.
-pub fn run(start: Option<Start>, settings: Settings) -> Result<()> {
+pub fn run(start: Option<Start>, settings: Settings, device: Device) -> Result<()> {
     let options = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title("relit")
@@ -34,7 +35,7 @@ pub fn run(start: Option<Start>, settings: Settings) -> Result<()> {
         ..Default::default()
     };
     let create: eframe::AppCreator<'_> = Box::new(|cc| {
-        let window = window(cc, start, settings)?;
+        let window = window(cc, start, settings, device)?;
         OPENED.store(true, Ordering::Relaxed);
         Ok(Box::new(window))
     });
@@ -71,6 +72,7 @@ fn window(
     cc: &eframe::CreationContext<'_>,
     start: Option<Start>,
     settings: Settings,
+    device: Device,
 ) -> Result<Window> {
     let software = cc.wgpu_render_state.as_ref().is_none_or(|render_state| {
         render_state.adapter.get_info().device_type == wgpu::DeviceType::Cpu
@@ -81,12 +83,15 @@ fn window(
     let kept = preferences::path();
     let preferences =
         (kept.as_ref()).map_or_else(Preferences::default, |path| Preferences::load(path));
+    let renderer = Renderer::find_later(device);
     let backend = Backend {
         sessions: preferences::sessions(),
+        renderer: renderer.clone(),
         ..Backend::default()
     };
     let session = Session::spawn_with(start.clone(), settings.clone(), wake, backend)?;
     let mut app = App::new(Box::new(session), preferences);
+    app.jobs.renderer = renderer;
     app.document.settings = settings;
     app.document.opening = start.map(|start| match start {
         Start::Capture(source, _) => source,

@@ -9,6 +9,7 @@ use crate::app::task::Task;
 use crate::app::trade::Measured;
 use crate::app::view::ViewState;
 use crate::app::worker::{Connection, Worker};
+use crate::render::Renderer;
 use crate::session::command::{Command, Source};
 use crate::session::snapshot::{Level, Phase};
 use std::path::PathBuf;
@@ -29,6 +30,8 @@ pub struct App {
 pub struct Jobs {
     /// The worker.
     pub worker: Worker,
+    /// What traces the paths of pictures.
+    pub renderer: Renderer,
     /// Photographs that are being written.
     pub batch: Option<Batch>,
     /// A scan that is being imported, and the folder of the capture that is made of it.
@@ -51,6 +54,7 @@ impl App {
             view,
             jobs: Jobs {
                 worker: Worker::new(connection),
+                renderer: Renderer::processor(),
                 batch: None,
                 importing: None,
                 measured: Measured::default(),

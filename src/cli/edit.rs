@@ -70,6 +70,7 @@ pub fn edit(arguments: &EditArguments) -> Result<i32> {
         samples: arguments.spp,
         denoise: denoiser,
         finish: true,
+        renderer: renderer.clone(),
     });
     let results = Results {
         capture,
@@ -80,7 +81,7 @@ pub fn edit(arguments: &EditArguments) -> Result<i32> {
         stopped_because: Some(loaded.saved.termination),
         checkpoint: None,
         views: arguments.views.unwrap_or_default(),
-        renderer: renderer.clone(),
+        renderer,
         denoiser,
         started: Instant::now(),
         seconds_load: 0.0,
@@ -90,9 +91,7 @@ pub fn edit(arguments: &EditArguments) -> Result<i32> {
     if let Some(photographs) = &photographs {
         let folder = arguments.out.join("photographs");
         std::fs::create_dir_all(&folder).map_err(|error| Error::io(&folder, &error))?;
-        code = write_with_progress(photographs, &renderer, &|frame| {
-            folder.join(format!("{frame:03}"))
-        })?;
+        code = write_with_progress(photographs, &|frame| folder.join(format!("{frame:03}")))?;
     }
     say::line(format_args!("results in {}", arguments.out.display()));
     Ok(code)

@@ -42,7 +42,6 @@ pub struct InsertArguments {
 /// Inserts objects and writes the composites. Returns the exit code.
 pub fn insert(arguments: &InsertArguments) -> Result<i32> {
     arguments.replace.apply();
-    let renderer = arguments.device.renderer()?;
     let loaded = arguments.saved.load()?;
     let work = Photographs {
         frames: match arguments.frame {
@@ -58,8 +57,9 @@ pub fn insert(arguments: &InsertArguments) -> Result<i32> {
         samples: arguments.spp,
         denoise: arguments.denoise.denoiser(true)?,
         finish: arguments.finish,
+        renderer: arguments.device.renderer()?,
     };
-    write_with_progress(&work, &renderer, &|frame| match arguments.frame {
+    write_with_progress(&work, &|frame| match arguments.frame {
         FrameChoice::One(_) => arguments.out.clone(),
         FrameChoice::All => with_ending(&arguments.out, &format!(".{frame:03}")),
     })

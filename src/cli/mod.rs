@@ -19,6 +19,7 @@ mod trade;
 
 use crate::error::{Error, Result};
 use crate::inverse::settings::Settings;
+use crate::render::Device;
 use crate::say;
 use crate::session::command::{PathKind, Source, Start};
 use crate::session::save;
@@ -33,7 +34,7 @@ use std::path::Path;
 const MAX_TYPOS: usize = 2;
 
 /// Opens the window; returns when it is closed.
-pub type Window = fn(Option<Start>, Settings) -> Result<()>;
+pub type Window = fn(Option<Start>, Settings, Device) -> Result<()>;
 
 /// Runs the program with the process's arguments. Returns the exit code: 0 done, 1 an error, 2 wrong usage, 128 + n terminated
 /// by signal n.
@@ -152,7 +153,7 @@ fn open(arguments: Arguments, window: Option<Window>) -> Result<i32> {
                 Some(results) => Start::Results(results),
                 None => Start::Capture(source.clone(), options.read.open(&settings)),
             };
-            match window(Some(start), settings) {
+            match window(Some(start), settings, options.device.device) {
                 Ok(()) => return Ok(0),
                 Err(error) => error.to_string(),
             }

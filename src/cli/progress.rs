@@ -4,7 +4,6 @@ use crate::cli::interrupt::Interrupt;
 use crate::error::Result;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{LossPoint, Progress};
-use crate::render::Renderer;
 use crate::say;
 use crate::session::photographs::Photographs;
 use crate::session::rates::Rates;
@@ -111,14 +110,10 @@ impl Meter {
 
 /// Writes photographs with a progress bar and prints the paths of their files; Ctrl-C stops after the last complete one. Returns
 /// the exit code.
-pub fn write_with_progress(
-    work: &Photographs,
-    renderer: &Renderer,
-    prefix: &dyn Fn(usize) -> PathBuf,
-) -> Result<i32> {
+pub fn write_with_progress(work: &Photographs, prefix: &dyn Fn(usize) -> PathBuf) -> Result<i32> {
     let interrupt = Interrupt::listen()?;
     let bar = bar("{bar:24} photograph {msg}, {eta} left");
-    let written = work.write_with(renderer, prefix, &|doing| {
+    let written = work.write(prefix, &|doing| {
         bar.set_position((f64::from(doing.fraction) * LENGTH as f64) as u64);
         bar.set_message(format!("{:03}", doing.frame));
         !interrupt.requested()

@@ -7,4 +7,4 @@ mod renderer;
 
 pub use device::Device;
 pub use pictures::Pictures;
-pub use renderer::{Renderer, warn_card_failed};
+pub use renderer::Renderer;

@@ -1,7 +1,7 @@
 //! Renders pictures of one lit scene.
 
 use crate::gpu::{Tracer, View};
-use crate::render::renderer::{Renderer, warn_card_failed};
+use crate::render::renderer::Renderer;
 use crate::scene::camera::Camera;
 use crate::transport::film::Film;
 use crate::transport::lit::LitScene;
@@ -10,6 +10,7 @@ use crate::transport::path::PathOptions;
 /// Renders views of one lit scene.
 #[derive(Debug)]
 pub struct Pictures<'a> {
+    renderer: Renderer,
     lit: &'a LitScene,
     tracer: Option<Tracer>,
 }
@@ -18,8 +19,9 @@ impl<'a> Pictures<'a> {
     /// Renders a scene on the card if the renderer has one that accepts it.
     pub fn new(renderer: &Renderer, lit: &'a LitScene) -> Self {
         Self {
-            lit,
             tracer: renderer.tracer(lit, &[]),
+            renderer: renderer.clone(),
+            lit,
         }
     }
 
@@ -38,15 +40,12 @@ impl<'a> Pictures<'a> {
             seed,
             frame,
         };
-        if let Some(tracer) = &mut self.tracer {
-            match tracer.film(&view, samples) {
-                Ok(film) => return film,
-                Err(error) => warn_card_failed(&error),
-            }
-            self.tracer = None;
-        }
-        let mut film = Film::new(camera);
-        film.add(self.lit, camera, options, seed, frame, samples);
-        film
+        let by_card = |_: &mut (), tracer: &mut Tracer| tracer.film(&view, samples);
+        let film = self.renderer.on_card(&mut (), &mut self.tracer, by_card);
+        film.unwrap_or_else(|| {
+            let mut film = Film::new(camera);
+            film.add(self.lit, camera, options, seed, frame, samples);
+            film
+        })
     }
 }

@@ -8,13 +8,16 @@ use crate::compose::insert::Insertion as Composite;
 use crate::compose::placement::{PlacedObject, Placement};
 use crate::compose::relight::Relighting;
 use crate::error::{Error, Result};
+use crate::gpu::Tracer;
 use crate::math::picture::Picture;
+use crate::render::Renderer;
 use crate::session::library::{Inserted, Library};
 use crate::session::light::Light;
 use crate::session::open_capture::OpenCapture;
 use crate::session::snapshot::Insertion;
 use crate::session::view::differs;
 use crate::transport::denoise::Denoiser;
+use crate::transport::lit::LitScene;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -29,6 +32,9 @@ const MIN_REPLACEMENT_SAMPLES: u32 = 8;
 /// Below this number of samples a picture is rough, and gets more of the solver's time.
 const ROUGH_SAMPLES: u32 = 4;
 
+/// Time that objects rest before the graphics card gets them: its hierarchy takes longer than a slice.
+const SETTLED: Duration = Duration::from_millis(150);
+
 /// Long side of the renders that relight a photograph at first, and their samples per pixel.
 const FIRST_RELIT: (u32, u32) = (160, 4);
 /// Long side of the renders that follow, before those of the photograph's own size, and their samples per pixel.
@@ -38,6 +44,9 @@ const SMALL_RELIT: (u32, u32) = (400, 4);
 #[derive(Debug)]
 struct Relit {
     relighting: Relighting,
+    lights: [Arc<LitScene>; 2],
+    /// The scene in both lights on the graphics card; made once.
+    tracers: Option<Option<[Tracer; 2]>>,
     /// Smaller renders, which come first.
     small: Option<Relighting>,
     light: Light,
@@ -49,13 +58,20 @@ struct Relit {
 }
 
 impl Relit {
-    fn new(relighting: Relighting, light: &Light, size: (usize, u32)) -> Self {
+    fn new(
+        relighting: Relighting,
+        lights: [Arc<LitScene>; 2],
+        light: &Light,
+        size: (usize, u32),
+    ) -> Self {
         let mut first = relighting.smaller(FIRST_RELIT.0);
         first.refine_to(FIRST_RELIT.1, || true);
         Self {
             photograph: Arc::new(first.photograph()),
             small: Some(relighting.smaller(SMALL_RELIT.0)),
             relighting,
+            lights,
+            tracers: None,
             light: light.clone(),
             size,
             samples: 1,
@@ -63,7 +79,7 @@ impl Relit {
     }
 
     /// Samples the renders for a slice, up to `samples` per pixel of the photograph. Returns whether the photograph changed.
-    fn refine_to(&mut self, samples: u32, go_on: impl Fn() -> bool) -> bool {
+    fn refine_to(&mut self, renderer: &Renderer, samples: u32, go_on: impl Fn() -> bool) -> bool {
         if let Some(small) = &mut self.small {
             let done = small.refine_to(SMALL_RELIT.1, go_on);
             if done {
@@ -73,7 +89,15 @@ impl Relit {
             return done;
         }
         // Denoising takes longer than a sample, so it is done when the samples have doubled.
-        let done = self.relighting.refine_to(samples, go_on);
+        let tracers = self.tracers.get_or_insert_with(|| {
+            let [before, after] = &self.lights;
+            Some([renderer.tracer(before, &[])?, renderer.tracer(after, &[])?])
+        });
+        let on_card =
+            |r: &mut Relighting, card: &mut [Tracer; 2]| r.refine_on(card, samples, &go_on);
+        let relighting = &mut self.relighting;
+        let done = renderer.on_card(relighting, tracers, on_card);
+        let done = done.unwrap_or_else(|| relighting.refine_to(samples, &go_on));
         let better = done && self.relighting.is_begun() && samples >= 2 * self.samples;
         if better {
             self.samples = samples;
@@ -94,6 +118,8 @@ struct Placed {
     /// Samples of `picture`; 0 while it is the first look.
     samples: u32,
     picture: Arc<Picture>,
+    /// The scene with the objects on the graphics card; made once.
+    tracer: Option<Option<Tracer>>,
 }
 
 impl Placed {
@@ -108,6 +134,7 @@ impl Placed {
             first_look,
             samples: 0,
             picture: inserted.composite.backdrop().photograph.clone(),
+            tracer: None,
             inserted,
         };
         placed.update_picture();
@@ -137,10 +164,26 @@ impl Placed {
         self.samples = if sampled { self.samples() } else { 0 };
     }
 
+    /// Uploads the scene with the objects to the graphics card, unless that was done before.
+    fn upload(&mut self, renderer: &Renderer) {
+        let composite = &self.inserted.composite;
+        self.tracer.get_or_insert_with(|| {
+            let objects = composite.objects.iter().map(|object| object.for_card());
+            renderer.tracer(&composite.lit, &objects.collect::<Vec<_>>())
+        });
+    }
+
     /// Samples both insertions up to `samples` together. Returns whether the picture changed.
-    fn refine_to(&mut self, samples: u32, go_on: impl Fn() -> bool) -> bool {
-        let first = (self.inserted.composite).refine_to(samples.div_ceil(2), &go_on);
-        let done = first && self.independent.refine_to(samples / 2, &go_on);
+    fn refine_to(&mut self, renderer: &Renderer, samples: u32, go_on: impl Fn() -> bool) -> bool {
+        let (half, other) = (&mut self.inserted.composite, &mut self.independent);
+        let mut refine = |half: &mut Composite, samples| {
+            let on_card =
+                |half: &mut Composite, card: &mut Tracer| half.refine_on(card, samples, &go_on);
+            let tracer = self.tracer.as_mut();
+            let done = tracer.and_then(|tracer| renderer.on_card(half, tracer, on_card));
+            done.unwrap_or_else(|| half.refine_to(samples, &go_on))
+        };
+        let done = refine(half, samples.div_ceil(2)) && refine(other, samples / 2);
         // Denoising takes longer than a sample, so it is done when the samples have doubled.
         let better = done && samples >= 2 && samples >= 2 * self.samples;
         if better {
@@ -276,7 +319,12 @@ impl Inserting {
     ///
     /// # Errors
     /// An object cannot be loaded or placed, and is removed; or the frame does not exist, and all objects are removed.
-    pub fn draw(&mut self, capture: &OpenCapture, light: &Light) -> Result<bool> {
+    pub fn draw(
+        &mut self,
+        renderer: &Renderer,
+        capture: &OpenCapture,
+        light: &Light,
+    ) -> Result<bool> {
         let started = Instant::now();
         if let Some(asked) = self.stale.take() {
             self.begun = Some(asked);
@@ -295,7 +343,7 @@ impl Inserting {
         let Some(samples) = self.samples().filter(|&s| s < MAX_SAMPLES) else {
             return Ok(false);
         };
-        let better = self.refine(samples + 1, started);
+        let better = self.refine(renderer, samples + 1, started);
         if better && self.samples() >= Some(self.hold) {
             self.hold = 0;
             self.picture();
@@ -305,19 +353,24 @@ impl Inserting {
     }
 
     /// Refines what has the fewest samples for a slice. Returns whether a picture changed.
-    fn refine(&mut self, samples: u32, started: Instant) -> bool {
+    fn refine(&mut self, renderer: &Renderer, samples: u32, started: Instant) -> bool {
         let go_on = || started.elapsed() < SLICE;
         if let Some(relit) = &mut self.relit
             && relit.relighting.samples() < samples
         {
-            let better = relit.refine_to(samples, go_on);
+            let better = relit.refine_to(renderer, samples, go_on);
             if let Some(placed) = self.placed.as_mut().filter(|_| better) {
                 placed.set_photograph(&relit.photograph);
             }
             return better;
         }
-        let placed = self.placed.as_mut();
-        placed.is_some_and(|placed| placed.refine_to(samples, go_on))
+        let Some(placed) = self.placed.as_mut() else {
+            return false;
+        };
+        if self.begun.is_some_and(|begun| begun.elapsed() > SETTLED) {
+            placed.upload(renderer);
+        }
+        placed.refine_to(renderer, samples, go_on)
     }
 
     /// Starts compositing all objects that can be placed. Returns the error of the first that cannot.
@@ -369,8 +422,9 @@ impl Inserting {
         }
         let lights = [&light.found, &light.edited].map(|e| Arc::new(e.lit(&capture.scene)));
         let (taken, denoiser) = (taken.clone(), Some(Denoiser::best()));
-        let relighting = Relighting::new(taken, lights, light.options, light.seed, denoiser);
-        self.relit = Some(Relit::new(relighting, light, size));
+        let (options, seed) = (light.options, light.seed);
+        let relighting = Relighting::new(taken, lights.clone(), options, seed, denoiser);
+        self.relit = Some(Relit::new(relighting, lights, light, size));
     }
 
     fn picture(&mut self) {

@@ -2,6 +2,7 @@
 
 use crate::compose::backdrop::Backdrop;
 use crate::compose::denoise::denoised;
+use crate::compose::insert::Insertion;
 use crate::compose::placement::{PlacedObject, Placement};
 use crate::compose::psf_and_grain::PsfAndGrain;
 use crate::compose::relight::Relighting;
@@ -10,7 +11,7 @@ use crate::error::Result;
 use crate::gpu::{self, Tracer};
 use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
-use crate::render::{Renderer, warn_card_failed};
+use crate::render::Renderer;
 use crate::session::library::Library;
 use crate::session::light::path_options;
 use crate::session::open_capture::OpenCapture;
@@ -42,6 +43,8 @@ pub struct Photographs {
     pub finish: bool,
     /// Frames of the photographs.
     pub frames: Vec<usize>,
+    /// What traces the paths.
+    pub renderer: Renderer,
 }
 
 /// Progress of writing.
@@ -75,16 +78,6 @@ impl Photographs {
         prefix: &dyn Fn(usize) -> PathBuf,
         report: &dyn Fn(WriteProgress) -> bool,
     ) -> Result<Written> {
-        self.write_with(&Renderer::processor(), prefix, report)
-    }
-
-    /// [`Photographs::write`] with a renderer.
-    pub(crate) fn write_with(
-        &self,
-        renderer: &Renderer,
-        prefix: &dyn Fn(usize) -> PathBuf,
-        report: &dyn Fn(WriteProgress) -> bool,
-    ) -> Result<Written> {
         let mut library = Library::default();
         let mut written = Written::default();
         let mut objects = Vec::new();
@@ -98,7 +91,8 @@ impl Photographs {
         let lights =
             (self.relight).then(|| [&self.found, &self.edited].map(|e| Arc::new(e.lit(scene))));
         let placed = Some(&objects).filter(|objects| !objects.is_empty());
-        let mut tracer = placed.and_then(|objects| self.tracer(renderer, objects));
+        let renderer = &self.renderer;
+        let mut tracer = placed.and_then(|objects| self.tracer(objects));
         let mut relighters = lights.as_ref().and_then(|[before, after]| {
             Some([renderer.tracer(before, &[])?, renderer.tracer(after, &[])?])
         });
@@ -113,7 +107,8 @@ impl Photographs {
             let prefix = prefix(frame);
             let lights = lights.as_ref();
             let go_on = |s| fraction(0, s);
-            let Some(backdrop) = self.backdrop(frame, lights, &mut relighters, &go_on)? else {
+            let tracers = &mut relighters;
+            let Some(backdrop) = self.backdrop(frame, lights, tracers, &go_on)? else {
                 return Ok(written);
             };
             if lights.is_some() {
@@ -142,9 +137,10 @@ impl Photographs {
     }
 
     /// The scene with the objects on the renderer's graphics card.
-    fn tracer(&self, renderer: &Renderer, objects: &[Arc<PlacedObject>]) -> Option<Tracer> {
+    fn tracer(&self, objects: &[Arc<PlacedObject>]) -> Option<Tracer> {
         let inserted: Vec<gpu::Inserted<'_>> = objects.iter().map(|o| o.for_card()).collect();
-        renderer.tracer(&self.edited.lit(&self.capture.scene), &inserted)
+        self.renderer
+            .tracer(&self.edited.lit(&self.capture.scene), &inserted)
     }
 
     /// The photograph, relit if there are two lights; `None` if the work was stopped.
@@ -174,7 +170,7 @@ impl Photographs {
                 let go_on = || go_on(before as f32 / samples as f32);
                 let whole =
                     |r: &mut Relighting, card: &mut [Tracer; 2]| r.refine_on(card, pass, go_on);
-                let done = on_card(&mut relighting, tracers, whole);
+                let done = self.renderer.on_card(&mut relighting, tracers, whole);
                 if !done.unwrap_or_else(|| relighting.refine_to(pass, go_on)) {
                     return Ok(None);
                 }
@@ -221,7 +217,9 @@ impl Photographs {
                 let pass = (before + step).min(samples);
                 let done = part as f32 + before as f32 / samples as f32;
                 let go_on = || go_on(done / parts as f32);
-                let done = on_card(half, tracer, |half, card| half.refine_on(card, pass, go_on));
+                let on_card =
+                    |half: &mut Insertion, card: &mut Tracer| half.refine_on(card, pass, go_on);
+                let done = self.renderer.on_card(half, tracer, on_card);
                 if !done.unwrap_or_else(|| half.refine_to(pass, go_on)) {
                     return Ok(None);
                 }
@@ -245,18 +243,4 @@ impl Photographs {
 /// Samples between two calls of `report`; a graphics card needs more work at a time.
 fn step(has_card: bool) -> u32 {
     if has_card { 16 } else { 1 }
-}
-
-/// Does work on the graphics card; `None` if there is none, or if it failed, which is reported.
-fn on_card<W, C>(
-    work: &mut W,
-    card: &mut Option<C>,
-    refine: impl FnOnce(&mut W, &mut C) -> Result<bool>,
-) -> Option<bool> {
-    let done = refine(work, card.as_mut()?);
-    if let Err(error) = &done {
-        warn_card_failed(error);
-        *card = None;
-    }
-    done.ok()
 }

@@ -13,6 +13,7 @@ use relit::error::Result;
 use relit::inverse::estimate::Estimate;
 use relit::inverse::settings::Settings;
 use relit::inverse::solver::{Checkpoint, Control, LossPoint, Observer, Solution, Termination};
+use relit::render::Renderer;
 use relit::session::Session;
 use relit::session::command::{Command, OpenOptions, Source, Start, ViewCamera, ViewRequest};
 use relit::session::edits::{Edits, ObjectEdit};
@@ -124,6 +125,7 @@ impl Rig {
                 OpenCapture::new(source.clone(), options.clone(), read(options)?)
             }),
             sessions,
+            renderer: Renderer::processor(),
             solve: Box::new(move |_: &Problem, _: &Settings, resume, observer| {
                 // Only the first solve panics.
                 let panic_at = stub.panic_at.take();

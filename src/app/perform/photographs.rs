@@ -41,6 +41,7 @@ impl App {
             samples: wanted.samples,
             denoise: wanted.denoise.then(Denoiser::best),
             finish: document.insertions.finish,
+            renderer: self.jobs.renderer.clone(),
         };
         let folder = PathBuf::from(wanted.folder.trim());
         let (into, wanted) = (folder.clone(), work.frames.len());

@@ -3,6 +3,7 @@
 mod requests;
 
 use crate::error::{Error, Result, panic_message};
+use crate::render::Renderer;
 use crate::session::edits::Edited;
 use crate::session::insertion::Inserting;
 use crate::session::light::Light;
@@ -35,6 +36,7 @@ pub struct Painter {
     wake: Wake,
     /// Threads of its own: the solver's work would make it wait for a whole stage.
     threads: ThreadPool,
+    renderer: Renderer,
     capture: Option<Arc<OpenCapture>>,
     views: Views,
     inserting: Inserting,
@@ -47,7 +49,12 @@ pub struct Painter {
 }
 
 impl Painter {
-    pub fn new(requests: Arc<Requests>, slot: Arc<Slot>, wake: Wake) -> Result<Self> {
+    pub fn new(
+        requests: Arc<Requests>,
+        slot: Arc<Slot>,
+        wake: Wake,
+        renderer: Renderer,
+    ) -> Result<Self> {
         let threads = ThreadPoolBuilder::new()
             .num_threads(rayon::current_num_threads())
             .thread_name(|index| format!("relit-painter-{index}"));
@@ -60,6 +67,7 @@ impl Painter {
             slot,
             wake,
             threads,
+            renderer,
             capture: None,
             views: Views::default(),
             inserting: Inserting::default(),
@@ -89,6 +97,10 @@ impl Painter {
                     false
                 }
             };
+            for warning in self.renderer.take_warnings() {
+                self.slot.say(Level::Warning, warning);
+                self.changed = true;
+            }
             idle = !busy;
             self.publish(idle);
             rest = match (busy, wanted.solving) {
@@ -114,17 +126,21 @@ impl Painter {
         let light = Light::new(wanted.found.clone(), edited, &wanted.settings);
         self.inserting.follow(&light);
         let (views, inserting) = (&mut self.views, &mut self.inserting);
+        let renderer = &self.renderer;
         // The composite that a user waits for comes before the re-render, which few look at then.
         let mut more = true;
         if !inserting.is_rough() || views.shown().is_none() {
             let (edited, options) = (&light.edited, &light.options);
-            let drawn = (self.threads).install(|| views.draw(&capture, edited, options));
+            let drawn = (self.threads).install(|| views.draw(&capture, edited, renderer, options));
             (self.changed, more) = (self.changed | drawn.0, drawn.1);
         }
         if !inserting.is_busy() {
             return more;
         }
-        match self.threads.install(|| inserting.draw(&capture, &light)) {
+        match self
+            .threads
+            .install(|| inserting.draw(renderer, &capture, &light))
+        {
             Ok(drawn) => self.changed |= drawn,
             Err(error) => {
                 self.requests.keep(self.inserting.placements());

@@ -108,7 +108,7 @@ impl Report {
                 frames: capture.photographs.len(),
                 pixels: sizes.sum(),
             },
-            device: results.renderer.card().unwrap_or("cpu").to_owned(),
+            device: results.renderer.card().unwrap_or_else(|| "cpu".to_owned()),
             denoiser: results.denoiser.map_or("none", Denoiser::name),
             rays: progress.rays,
             rays_per_second: match progress.seconds > 0.0 {

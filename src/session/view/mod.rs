@@ -6,6 +6,7 @@ pub mod sized;
 mod target;
 
 use crate::inverse::estimate::Estimate;
+use crate::render::Renderer;
 use crate::session::command::{ViewCamera, ViewRequest};
 use crate::session::open_capture::OpenCapture;
 use crate::session::snapshot::View;
@@ -75,6 +76,7 @@ impl Views {
         &mut self,
         capture: &OpenCapture,
         estimate: &Arc<Estimate>,
+        renderer: &Renderer,
         options: &PathOptions,
     ) -> (bool, bool) {
         let now = Instant::now();
@@ -86,7 +88,7 @@ impl Views {
             self.follow(estimate, now);
         }
         let (target, sequence) = (self.target.as_mut(), self.sequence + 1);
-        let view = target.and_then(|target| target.sharpen(options, sequence));
+        let view = target.and_then(|target| target.sharpen(renderer, options, sequence));
         let drawn = view.is_some();
         if let Some(view) = view {
             (self.sequence, self.shown) = (sequence, Some(Arc::new(view)));

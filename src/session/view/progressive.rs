@@ -1,5 +1,7 @@
 //! A progressive render, in slices of rows.
 
+use crate::error::Result;
+use crate::gpu::{Tracer, View};
 use crate::math::picture::Picture;
 use crate::math::rng::Stream;
 use crate::scene::camera::Camera;
@@ -24,15 +26,15 @@ pub struct Progressive {
     width: usize,
     height: usize,
     pub split: Option<Arc<Split>>,
-    /// Sums by rows, all layers of a pixel together.
+    /// Sums by rows, all layers of a pixel together; without a split, of every other pass.
     sums: Vec<DVec3>,
-    /// Sums of every other pass, without a split: an independent half for estimating the noise.
+    /// Sums of the other passes, without a split: an independent half for estimating the noise.
     half: Vec<DVec3>,
     /// Number of samples in `half`.
     half_weight: f64,
     /// Whether to reduce the weight of earlier samples at the end of the pass.
     fades: bool,
-    /// Number of samples in `sums`, in whole passes.
+    /// Number of samples in both, in whole passes.
     weight: f64,
     pass: u32,
     row: usize,
@@ -96,20 +98,10 @@ impl Progressive {
         let wanted = ((self.rows_a_second * SLICE) as usize).max(rayon::current_num_threads());
         let last = (self.row + wanted).min(height);
         let (row, pass) = (self.row, u64::from(self.pass));
-        let other = pass % 2 == 1 && split.is_none();
-        // In every other pass the rows of `half`, else empty ones.
-        let half = &mut self.half[if other {
-            row * width..last * width
-        } else {
-            0..0
-        }];
-        let mut halves: Vec<&mut [DVec3]> = half.chunks_mut(width.max(1)).collect();
-        halves.resize_with(last - row, Default::default);
-        self.sums[row * row_of..last * row_of]
+        self.sums_of_pass()[row * row_of..last * row_of]
             .par_chunks_mut(row_of.max(1))
-            .zip(halves)
             .enumerate()
-            .for_each(|(i, (sums, half))| {
+            .for_each(|(i, sums)| {
                 let mut parts = Parts::new();
                 for (x, sums) in sums.chunks_mut(layers).enumerate() {
                     let y = row + i;
@@ -123,9 +115,6 @@ impl Progressive {
                         None => {
                             let sample = radiance(world, &ray, &mut stream, options);
                             sums[0] += sample.radiance.as_dvec3();
-                            if let Some(half) = half.get_mut(x) {
-                                *half += sample.radiance.as_dvec3();
-                            }
                         }
                     }
                 }
@@ -136,14 +125,57 @@ impl Progressive {
         if last < height {
             return false;
         }
+        self.end_pass();
+        true
+    }
+
+    /// Renders a pass without a split on the graphics card; call it only between passes.
+    ///
+    /// # Errors
+    /// The card failed; the render is unchanged.
+    pub fn add_on(
+        &mut self,
+        tracer: &mut Tracer,
+        camera: &Camera,
+        options: &PathOptions,
+    ) -> Result<()> {
+        let view = View {
+            camera,
+            options,
+            seed: 0,
+            frame: 0,
+        };
+        let pass = self.pass;
+        tracer.accumulate(&view, pass..pass + 1, self.sums_of_pass())?;
+        self.end_pass();
+        Ok(())
+    }
+
+    /// Whether the next row is the first of a pass.
+    pub fn is_between_passes(&self) -> bool {
+        self.row == 0
+    }
+
+    fn sums_of_pass(&mut self) -> &mut [DVec3] {
+        match self.is_other_pass() {
+            true => &mut self.half,
+            false => &mut self.sums,
+        }
+    }
+
+    /// Whether the samples of this pass belong to `half`.
+    fn is_other_pass(&self) -> bool {
+        self.split.is_none() && self.pass % 2 == 1
+    }
+
+    fn end_pass(&mut self) {
+        self.half_weight += f64::from(u8::from(self.is_other_pass()));
         self.row = 0;
-        self.half_weight += if other { 1.0 } else { 0.0 };
         self.pass += 1;
         self.weight += 1.0;
         if std::mem::take(&mut self.fades) {
             self.fade();
         }
-        true
     }
 
     /// Mean radiance of all layers together; call it only between passes.
@@ -151,6 +183,9 @@ impl Progressive {
         let scale = self.scale();
         let pixels = match self.layers() {
             0 => vec![Vec3::ZERO; self.width * self.height],
+            _ if self.split.is_none() => (self.sums.par_iter().zip(&self.half))
+                .map(|(a, b)| ((*a + *b) * scale).as_vec3())
+                .collect(),
             layers => (self.sums.chunks(layers))
                 .map(|sums| (sums.iter().sum::<DVec3>() * scale).as_vec3())
                 .collect(),
@@ -164,10 +199,11 @@ impl Progressive {
         if self.half.is_empty() || self.half_weight <= 0.0 || rest <= 0.0 {
             return None;
         }
-        let one = (self.half.iter()).map(|sum| (*sum / self.half_weight).as_vec3());
-        let other = self.sums.iter().zip(&self.half);
-        let other = other.map(|(sum, half)| ((*sum - *half) / rest).as_vec3());
-        Some([sized(camera, one.collect()), sized(camera, other.collect())])
+        let mean = |sums: &[DVec3], weight: f64| {
+            let pixels = sums.par_iter().map(|sum| (*sum / weight).as_vec3());
+            sized(camera, pixels.collect())
+        };
+        Some([mean(&self.half, self.half_weight), mean(&self.sums, rest)])
     }
 
     /// Mean radiance of each layer; call it only between passes.
@@ -190,5 +226,41 @@ fn sized(camera: &Camera, pixels: Vec<Vec3>) -> Picture {
         width: camera.intrinsics.width,
         height: camera.intrinsics.height,
         pixels,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::{Adapters, Card};
+    use crate::room::Room;
+
+    /// Both halves and their sum, up to rounding, which can send a path elsewhere.
+    #[test]
+    fn passes_on_a_card_are_those_of_the_processor() {
+        let Some(card) = Card::open(Adapters::Any) else {
+            println!("skipped: no graphics adapter");
+            return;
+        };
+        let lit = Room::new().lit([32, 24]).expect("the room is sound");
+        let (camera, options) = (&lit.scene.cameras[1], PathOptions::default());
+        let mut tracer = Tracer::new(&card, &lit, &[]).expect("the room fits");
+        let mut renders = [(); 2].map(|()| Progressive::new(camera, None));
+        for _ in 0..3 {
+            while !renders[0].add(&lit, camera, &options) {}
+            renders[1]
+                .add_on(&mut tracer, camera, &options)
+                .expect("the card works");
+        }
+        let [a, b] = renders.each_ref().map(|render| {
+            let [half, other] = render.halves(camera).expect("both halves");
+            [render.picture(camera), half, other]
+        });
+        for (a, b) in a.iter().zip(&b) {
+            let pairs = a.pixels.iter().zip(&b.pixels);
+            let alike = pairs.filter(|(a, b)| (**a - **b).abs().max_element() < 1e-3);
+            let alike = alike.count() as f64 / a.pixels.len() as f64;
+            assert!(alike > 0.97, "{alike}");
+        }
     }
 }

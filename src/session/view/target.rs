@@ -1,8 +1,10 @@
 //! A view being rendered.
 
 use crate::capture::photograph::Photograph;
+use crate::gpu::Tracer;
 use crate::inverse::estimate::Estimate;
 use crate::math::picture::Picture;
+use crate::render::Renderer;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::session::command::{ViewCamera, ViewRequest};
@@ -40,6 +42,8 @@ pub struct Target {
     hits: Option<Hits>,
     world: LitScene,
     render: Progressive,
+    /// The scene on the graphics card; made once.
+    tracer: Option<Option<Tracer>>,
     /// The newest complete render, and its samples per pixel.
     rendered: Option<(Arc<Picture>, u32)>,
     /// Whether the render is shown.
@@ -84,6 +88,7 @@ impl Target {
         Some(Self {
             render: Progressive::new(&camera, split),
             world,
+            tracer: None,
             rendered: None,
             watched: request.render || request.layers,
             hold: 0,
@@ -122,6 +127,7 @@ impl Target {
     fn adopt(&mut self, estimate: &Arc<Estimate>) {
         self.estimate = estimate.clone();
         self.world = estimate.lit(&self.scene);
+        self.tracer = None;
         self.guides = None;
         self.stale = true;
         // With other lamps the layers are others.
@@ -144,7 +150,12 @@ impl Target {
     }
 
     /// Renders the next slice. Returns the pictures if one of them changed.
-    pub fn sharpen(&mut self, options: &PathOptions, sequence: u64) -> Option<View> {
+    pub fn sharpen(
+        &mut self,
+        renderer: &Renderer,
+        options: &PathOptions,
+        sequence: u64,
+    ) -> Option<View> {
         if let Some(coarse) = self.coarse.take() {
             self.sketch(&coarse, options);
         } else if self.stale {
@@ -154,7 +165,7 @@ impl Target {
             self.map(&hits, &self.camera.clone());
             self.objects = Some(Arc::new(hits.objects(&self.scene)));
             self.hits = Some(hits);
-        } else if self.is_done() || !self.render.add(&self.world, &self.camera, options) {
+        } else if self.is_done() || !self.sample(renderer, options) {
             return None;
         } else {
             let samples = self.render.samples();
@@ -171,6 +182,21 @@ impl Target {
             self.rendered = Some((Arc::new(picture), samples));
         }
         Some(self.view(sequence))
+    }
+
+    /// Renders a pass on the graphics card, or else some rows. Returns whether a pass is complete.
+    fn sample(&mut self, renderer: &Renderer, options: &PathOptions) -> bool {
+        let (render, camera) = (&mut self.render, &self.camera);
+        if render.split.is_none() && render.is_between_passes() {
+            let tracer = (self.tracer).get_or_insert_with(|| renderer.tracer(&self.world, &[]));
+            let pass = |render: &mut Progressive, tracer: &mut Tracer| {
+                render.add_on(tracer, camera, options)
+            };
+            if renderer.on_card(render, tracer, pass).is_some() {
+                return true;
+            }
+        }
+        render.add(&self.world, camera, options)
     }
 
     /// The mean of all samples; denoised if there are two halves.

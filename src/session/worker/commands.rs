@@ -5,7 +5,6 @@ use crate::capture::place::Coordinates;
 use crate::export::picture::shown_at;
 use crate::export::{light_layers, scene};
 use crate::math::picture::Picture;
-use crate::render::Renderer;
 use crate::session::command::{Command, ExportRequest, OpenOptions};
 use crate::session::save::pictures::Frames;
 use crate::session::save::{self, Results};
@@ -146,7 +145,7 @@ impl Worker {
             },
             checkpoint: self.checkpoint.clone(),
             views: Frames::default(),
-            renderer: Renderer::processor(),
+            renderer: self.backend.renderer.clone(),
             denoiser: Some(Denoiser::best()),
             started: self.started,
             seconds_load: self.seconds_load,

@@ -10,6 +10,7 @@ use crate::calibrate::problem::Problem;
 use crate::error::{Error, Result};
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Observer, Solution};
+use crate::render::Renderer;
 use crate::session::command::{Command, OpenOptions, Source, Start};
 use crate::session::inbox::{self, Outbox};
 use crate::session::open_capture::OpenCapture;
@@ -39,6 +40,8 @@ pub struct Backend {
     pub solve: Box<Solver>,
     /// The folder of automatically saved sessions; `None` to save none.
     pub sessions: Option<PathBuf>,
+    /// What traces paths of pictures.
+    pub renderer: Renderer,
 }
 
 impl Default for Backend {
@@ -47,6 +50,7 @@ impl Default for Backend {
             open: Box::new(crate::session::open::open),
             solve: Box::new(crate::inverse::solve),
             sessions: None,
+            renderer: Renderer::processor(),
         }
     }
 }
@@ -87,7 +91,8 @@ impl Session {
             Some(Start::Capture(source, options)) => Next::Open(source, options, Begin::GoingOn),
             Some(Start::Results(folder)) => Next::Resume(folder),
         };
-        let painter = Painter::new(requests.clone(), slot.clone(), wake.clone())?;
+        let renderer = backend.renderer.clone();
+        let painter = Painter::new(requests.clone(), slot.clone(), wake.clone(), renderer)?;
         let shared = (slot.clone(), requests.clone());
         let worker = move || Worker::new(inbox, shared, settings, wake, backend).run(first);
         Ok(Self {
