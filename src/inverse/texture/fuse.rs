@@ -21,6 +21,8 @@ const MAX_STEPS: u32 = 12;
 const CONVERGED: f64 = 1e-3;
 /// Terms added up by one thread.
 const CHUNK: usize = 4096;
+/// Least number of cells or measurements that are given to a thread: fewer cost more than they save.
+const TASK: usize = 1024;
 
 /// The measurements and the penalty of a fit.
 #[derive(Clone, Copy)]
@@ -78,20 +80,21 @@ pub fn fuse(problem: &Problem, strength: f32, start: &[Vec3]) -> Vec<Vec3> {
 
 /// λ b / (l max(‖xᵢ − xⱼ‖, FLAT l)) for every link.
 pub fn penalties(links: &Links, levels: &[f32], strength: f32, colors: &[Vec3]) -> Vec<f32> {
-    let rows: Vec<Vec<f32>> = (0..colors.len())
+    let of_cell = |cell: usize| {
+        links.neighbours(cell).map(move |(at, other)| {
+            let difference = (colors[cell] - colors[other]).length();
+            let level = 0.5 * (levels[cell] + levels[other]);
+            strength * links.borders[at] / (level * difference.max(FLAT * level))
+        })
+    };
+    let tasks: Vec<Vec<f32>> = (0..colors.len().div_ceil(TASK))
         .into_par_iter()
-        .map(|cell| {
-            links
-                .neighbours(cell)
-                .map(|(at, other)| {
-                    let difference = (colors[cell] - colors[other]).length();
-                    let level = 0.5 * (levels[cell] + levels[other]);
-                    strength * links.borders[at] / (level * difference.max(FLAT * level))
-                })
-                .collect()
+        .map(|task| {
+            let cells = task * TASK..colors.len().min((task + 1) * TASK);
+            cells.flat_map(of_cell).collect()
         })
         .collect();
-    rows.concat()
+    tasks.concat()
 }
 
 /// The normal equations of one reweighting.
@@ -113,45 +116,48 @@ impl System<'_> {
     pub fn solve(&self, data: &[Vec3], right: &[Vec3], colors: &mut [Vec3]) {
         let scale: Vec<Vec3A> = (0..colors.len())
             .into_par_iter()
+            .with_min_len(TASK)
             .map(|cell| {
                 let penalty: f32 = self.penalties[self.links.row(cell)].iter().sum();
                 Vec3A::from(data[cell] + penalty + self.prior_weight).recip()
             })
             .collect();
         let mut found: Vec<Vec3A> = colors.iter().map(|&c| c.into()).collect();
-        let mut residual = self.apply(&found);
-        for (r, b) in residual.iter_mut().zip(right) {
-            *r = Vec3A::from(*b) - *r;
-        }
-        let preconditioned = |residual: &[Vec3A]| -> Vec<Vec3A> {
-            residual.iter().zip(&scale).map(|(r, s)| *r * *s).collect()
-        };
-        let mut z = preconditioned(&residual);
-        let mut direction = z.clone();
-        let mut rz = dot(&residual, &z);
+        let mut product = Product::default();
+        self.apply(&found, &mut product);
+        let mut residual: Vec<Vec3A> = (product.result.iter().zip(right))
+            .map(|(p, b)| Vec3A::from(*b) - *p)
+            .collect();
+        let mut direction: Vec<Vec3A> = (residual.iter().zip(&scale))
+            .map(|(r, s)| *r * *s)
+            .collect();
+        let mut rz = dot(&residual, &direction);
         let goal = rz * 1e-4;
         for _ in 0..MAX_STEPS {
             if !(rz > goal && rz > 0.0) {
                 break;
             }
-            let product = self.apply(&direction);
-            let alpha = (rz / dot(&direction, &product)) as f32;
+            self.apply(&direction, &mut product);
+            let alpha = (rz / dot(&direction, &product.result)) as f32;
             if !alpha.is_finite() {
                 break;
             }
-            for (((x, r), d), p) in (found.iter_mut().zip(&mut residual))
-                .zip(&direction)
-                .zip(&product)
-            {
-                *x += *d * alpha;
-                *r -= *p * alpha;
-            }
-            z = preconditioned(&residual);
-            let next = dot(&residual, &z);
+            (found.par_iter_mut().zip(&mut residual))
+                .zip(direction.par_iter().zip(&product.result))
+                .with_min_len(TASK)
+                .for_each(|((x, r), (d, p))| {
+                    *x += *d * alpha;
+                    *r -= *p * alpha;
+                });
+            // With the preconditioner's diagonal.
+            let next = sum(&residual, &scale, |r, s| {
+                r.as_dvec3().dot((r * s).as_dvec3())
+            });
             let beta = (next / rz) as f32;
-            for (d, z) in direction.iter_mut().zip(&z) {
-                *d = *z + *d * beta;
-            }
+            (direction.par_iter_mut())
+                .zip(residual.par_iter().zip(&scale))
+                .with_min_len(TASK)
+                .for_each(|(d, (r, s))| *d = *r * *s + *d * beta);
             rz = next;
         }
         for (color, found) in colors.iter_mut().zip(found) {
@@ -160,17 +166,20 @@ impl System<'_> {
     }
 
     /// The product of the matrix and a vector, whose colours are padded so that each is read at once.
-    fn apply(&self, x: &[Vec3A]) -> Vec<Vec3A> {
-        let measured: Vec<Vec3A> = (0..self.observations.rows())
+    fn apply(&self, x: &[Vec3A], product: &mut Product) {
+        (0..self.observations.rows())
             .into_par_iter()
+            .with_min_len(TASK)
             .map(|row| {
                 let cells = self.observations.row(row);
                 let value: Vec3A = cells.map(|(cell, w)| x[cell] * w).sum();
                 value * Vec3A::from(self.row_weights[row])
             })
-            .collect();
+            .collect_into_vec(&mut product.measured);
+        let measured = &product.measured;
         (0..x.len())
             .into_par_iter()
+            .with_min_len(TASK)
             .map(|cell| {
                 let data: Vec3A = (self.observations.column(cell))
                     .map(|(row, w)| measured[row] * w)
@@ -180,8 +189,15 @@ impl System<'_> {
                     .sum();
                 data + smooth + x[cell] * self.prior_weight
             })
-            .collect()
+            .collect_into_vec(&mut product.result);
     }
+}
+
+/// The result of a product, and the weighted measurements on the way, kept for the next one.
+#[derive(Default)]
+struct Product {
+    measured: Vec<Vec3A>,
+    result: Vec<Vec3A>,
 }
 
 fn dot(a: &[Vec3A], b: &[Vec3A]) -> f64 {
