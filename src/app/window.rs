@@ -72,8 +72,8 @@ impl Window {
             let line = Panel::top("session").exact_size(theme::ROW + 8.0);
             bar(ui, line, 8, 4).show(ui, |ui| sessions::line(ui, parts, name));
         }
-        let (status, batch) = (Panel::bottom("status"), app.jobs.batch.as_ref());
-        bar(ui, status.exact_size(24.0), 8, 2).show(ui, |ui| status::bar(ui, parts, batch));
+        let (status, jobs) = (Panel::bottom("status").exact_size(24.0), &app.jobs);
+        bar(ui, status, 8, 2).show(ui, |ui| status::bar(ui, parts, jobs));
         if start_page {
             return;
         }

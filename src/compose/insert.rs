@@ -135,8 +135,8 @@ impl Insertion {
         true
     }
 
-    /// [`Insertion::refine_to`] on a graphics card that holds the scene and the objects. After an error some rows
-    /// have more samples than others; [`Insertion::refine_to`] completes the rest.
+    /// [`Insertion::refine_to`] on a graphics card that holds the scene and the objects. After an error some rows have more samples
+    /// than others; [`Insertion::refine_to`] completes the rest.
     ///
     /// # Errors
     /// The card failed.
@@ -160,14 +160,18 @@ impl Insertion {
             seed: self.seed,
             frame: self.backdrop.frame,
         };
-        for first in (0..height).step_by(band) {
+        let mut first = 0;
+        while first < height {
             if !go_on() {
                 return Ok(false);
             }
-            let rows = first..(first + band).min(height);
-            let taken = self.row_samples[rows.clone()].iter().copied().min();
-            let pixels = (first * width) as u32..(rows.end * width) as u32;
-            for from in (taken.unwrap_or(samples)..samples).step_by(SAMPLES_AT_ONCE as usize) {
+            // Rows with equally many samples: the processor may have stopped in mid-pass.
+            let taken = self.row_samples[first];
+            let alike = self.row_samples[first..].iter().take(band);
+            let rows = first..first + alike.take_while(|&&n| n == taken).count();
+            first = rows.end;
+            let pixels = (rows.start * width) as u32..(rows.end * width) as u32;
+            for from in (taken..samples).step_by(SAMPLES_AT_ONCE as usize) {
                 let to = samples.min(from + SAMPLES_AT_ONCE);
                 tracer.pairs(&view, pixels.clone(), from..to, |_, added| {
                     self.accumulate(rows.clone(), to - from, added);

@@ -104,6 +104,11 @@ impl Relighting {
         self.samples() >= self.pairs.len() as u32
     }
 
+    /// Whether no pass is half done.
+    pub fn is_between_passes(&self) -> bool {
+        self.next_row == 0
+    }
+
     /// Samples every pixel up to `samples` paths. Stops between two bands of rows once `go_on` returns false; the
     /// next call continues there. Returns whether all samples are done.
     pub fn refine_to(&mut self, samples: u32, go_on: impl Fn() -> bool) -> bool {
@@ -141,12 +146,15 @@ impl Relighting {
     ) -> Result<bool> {
         let parts = self.pairs.len() as u32;
         for (part, pair) in (0..).zip(&mut self.pairs) {
-            if !go_on() {
-                return Ok(false);
-            }
             // The first pair takes an odd sample.
             let wanted = (samples + parts - 1 - part) / parts;
             let missing = wanted.saturating_sub(pair[1].samples);
+            if missing == 0 {
+                continue;
+            }
+            if !go_on() {
+                return Ok(false);
+            }
             let view = View {
                 camera: &self.camera,
                 options: &self.options,

@@ -26,7 +26,7 @@ pub struct Card {
 }
 
 /// Time after which a dispatch counts as hung.
-const TIMEOUT: Duration = Duration::from_secs(60);
+pub(super) const TIMEOUT: Duration = Duration::from_secs(60);
 
 impl Card {
     /// Opens the best accepted adapter; `None` if none can trace paths.
@@ -115,6 +115,11 @@ impl Card {
         self.device.destroy();
         // The callback runs during a poll.
         let _ = self.device.poll(wgpu::PollType::Poll);
+    }
+
+    /// Whether it has failed for good.
+    pub fn is_lost(&self) -> bool {
+        self.check().is_err()
     }
 
     /// Waits until a submission is done.

@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::gpu::buffers::empty;
+use crate::gpu::card::TIMEOUT;
 use crate::gpu::layout::{Dispatch, FILM, Kernel, WORKGROUP};
 use crate::gpu::tracer::{Tracer, Word};
 use std::ops::Range;
@@ -142,10 +143,11 @@ impl Tracer {
         read.map_async(wgpu::MapMode::Read, 0..bytes, move |mapped| {
             let _ = send.send(mapped.is_ok());
         });
-        // The copy is done, so that this only runs the callback.
-        let polled = card.device.poll(wgpu::PollType::wait_indefinitely());
+        // The copy is done. Another thread's poll may run the callback.
+        let polled = card.device.poll(wgpu::PollType::Poll);
+        let mapped = polled.is_ok() && receive.recv_timeout(TIMEOUT).unwrap_or(false);
         card.check()?;
-        if polled.is_err() || !receive.try_recv().unwrap_or(false) {
+        if !mapped {
             return Err(failed());
         }
         let view = read.get_mapped_range(0..bytes).map_err(|_| failed())?;

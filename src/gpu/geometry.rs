@@ -66,8 +66,8 @@ impl Geometry {
 /// nodes). The second child follows the first. Without triangles, one box that no ray hits.
 fn nodes(tree: &Tree) -> Vec<[u32; 4]> {
     let Some(root) = tree.nodes.first() else {
-        let (low, high) = (Vec3::splat(f32::MAX), Vec3::splat(-f32::MAX));
-        return vec![word(low, 0), word(high, 1)];
+        let corner = Vec3::splat(f32::MAX);
+        return vec![word(corner, 0), word(corner, 1)];
     };
     // Enlarge boxes by the rounding error of the largest coordinate, so that rays within their faces hit them.
     let margin = root.low.abs().max(root.high.abs()).max_element() * 2.0 * f32::EPSILON;

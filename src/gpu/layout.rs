@@ -195,9 +195,13 @@ pub(super) const RENDER: Kernel = Kernel {
     name: "render",
     words: 1,
 };
-/// Accumulates radiance with and without inserted objects. Words: the sum with them, and the number of samples whose first hit is
-/// an inserted object; the sum without them; both sums over those samples alone; the numbers of rays, of rejected samples and of
-/// samples that the objects change.
+/// Accumulates radiance with and without inserted objects. Its words:
+///
+/// 1. the sum with them, and the number of samples whose first hit is an inserted object,
+/// 2. the sum without them,
+/// 3. the sum with them over those samples,
+/// 4. the sum without them over those samples,
+/// 5. the numbers of rays, of rejected samples and of samples that the objects change.
 pub(super) const INSERT: Kernel = Kernel {
     name: "insert",
     words: 5,

@@ -38,20 +38,37 @@ pub(super) struct Materials {
 }
 
 impl Materials {
-    /// The materials of a scene, with the pdf of light sampling.
-    pub fn new(lit: &LitScene) -> Self {
+    /// The materials of a scene, with the pdf of light sampling; `None` if tables differ in length, which the shader does not check.
+    pub fn new(lit: &LitScene) -> Option<Self> {
         let mut all = Self::default();
+        let triangles = lit.scene.triangles.len();
+        let fit = lit
+            .materials
+            .iter()
+            .all(|material| is_whole(material, triangles));
+        if !fit || lit.materials.len() != lit.scene.objects.len() {
+            return None;
+        }
         for (object, material) in lit.materials.iter().enumerate() {
             let mut packed = all.pack(material, 0);
             let density = lit.emitters.pdf(object as u32);
             packed.emission = with(material.emission, density);
             all.materials.push(packed);
         }
-        all
+        Some(all)
     }
 
-    /// Adds the materials of an inserted object whose first triangle has index `first`.
-    pub fn insert(&mut self, object: &Inserted<'_>, first: u32) {
+    /// Adds the materials of an inserted object whose first triangle has index `first`; `None` if tables differ in length.
+    pub fn insert(&mut self, object: &Inserted<'_>, first: u32) -> Option<()> {
+        let triangles = object.corners.len();
+        let corners = [object.corner_normals, object.corner_colors];
+        let fit = (corners.iter()).all(|table| table.is_empty() || table.len() == triangles)
+            && [object.normals.len(), object.material_of.len()] == [triangles; 2]
+            && (object.material_of.iter()).all(|&m| (m as usize) < object.materials.len())
+            && (object.materials.iter()).all(|material| is_whole(material, triangles));
+        if !fit {
+            return None;
+        }
         let normals = self.corners(object.corner_normals);
         let colors = self.corners(object.corner_colors);
         for material in object.materials {
@@ -61,6 +78,7 @@ impl Materials {
                 ..packed
             });
         }
+        Some(())
     }
 
     /// Packs a material without emission.
@@ -115,6 +133,20 @@ impl Materials {
             self.data.extend(items.iter().flat_map(words));
         }
         stored
+    }
+}
+
+/// Whether the tables of a material hold an entry for every triangle, texel and pixel.
+fn is_whole(material: &Material, triangles: usize) -> bool {
+    match &material.albedo {
+        Albedo::Constant(_) => true,
+        Albedo::Texels(texels) => {
+            texels.layout.first.len() == triangles + 1 && texels.colors.len() == texels.layout.len()
+        }
+        Albedo::Image(texture, _) => {
+            let size = texture.width as usize * texture.height as usize;
+            size > 0 && texture.pixels.len() == size && texture.corner_uvs.len() == triangles
+        }
     }
 }
 

@@ -7,7 +7,8 @@
 //! pipelines  the compiled shaders
 //! buffers    buffers on the card
 //! geometry   triangles and their hierarchy on the card
-//! materials  materials, and lights: both in the shader's layout
+//! materials  materials in the shader's layout
+//! lights     emitters and environment in the shader's layout
 //! tracer     a lit scene on the card: pictures, pairs of pictures, single rays
 //! film       the dispatches that fill the film buffer
 //! pace       the amount of work per dispatch

@@ -36,8 +36,8 @@ impl Pace {
 
     /// Adapts to the duration of a dispatch of `paths` paths.
     pub fn record(&mut self, paths: u32, time: Duration) {
-        // Small dispatches are not representative.
-        if paths < self.paths / 2 {
+        // Small dispatches are not representative, unless they are slow.
+        if paths < self.paths / 2 && time.as_secs_f64() < TARGET_SECONDS {
             return;
         }
         let factor = (TARGET_SECONDS / time.as_secs_f64().max(1e-6)).clamp(0.25, 4.0);

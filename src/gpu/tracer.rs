@@ -4,6 +4,8 @@ use crate::error::Result;
 use crate::gpu::buffers::{empty, storage};
 use crate::gpu::card::Card;
 use crate::gpu::film::FilmBuffers;
+#[cfg(doc)]
+use crate::gpu::film::SAMPLES_AT_ONCE;
 use crate::gpu::geometry::Geometry;
 use crate::gpu::layout::{Dispatch, INSERT, NONE, RENDER, TRACE};
 use crate::gpu::lights::{emitters, environment};
@@ -125,11 +127,15 @@ impl Tracer {
         lit: &LitScene,
         objects: &[Inserted<'_>],
     ) -> Result<Self> {
-        let mut materials = Materials::new(lit);
+        let mismatch = || card.failed("tables of the scene differ in length".to_owned());
+        let mut materials = Materials::new(lit).ok_or_else(mismatch)?;
         let mut first = lit.scene.triangles.len() as u32;
         for object in objects {
-            materials.insert(object, first);
+            materials.insert(object, first).ok_or_else(mismatch)?;
             first += object.corners.len() as u32;
+        }
+        if geometry.slot_of.len() != first as usize {
+            return Err(mismatch());
         }
         let (emitters, count) = emitters(lit, &geometry.slot_of);
         let outside = lit.outside.as_deref().map(environment);
@@ -182,8 +188,8 @@ impl Tracer {
         Ok(())
     }
 
-    /// Adds a range of samples to the sum of each pixel. After an error sums of up to [`crate::gpu::SAMPLES_AT_ONCE`] samples that fit in one
-    /// buffer are unchanged, others invalid.
+    /// Adds a range of samples to the sum of each pixel. On an error, `sums` are unchanged if `samples` are at most
+    /// [`SAMPLES_AT_ONCE`] and the pixels fit one buffer, otherwise invalid.
     ///
     /// # Errors
     /// The card failed.
@@ -212,7 +218,7 @@ impl Tracer {
     }
 
     /// Traces pairs of paths with and without the inserted objects, and calls `add` with ranges of the pixels and their sums of up
-    /// to [`crate::gpu::SAMPLES_AT_ONCE`] samples.
+    /// to [`SAMPLES_AT_ONCE`] samples.
     ///
     /// # Errors
     /// The card failed.

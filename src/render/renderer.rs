@@ -19,8 +19,8 @@ struct State {
     opening: Option<JoinHandle<Result<Option<Card>>>>,
     /// The triangles of the last scene without inserted objects.
     geometry: Option<(Weak<Scene>, Arc<Geometry>)>,
-    /// The last scene that the card refused.
-    refused: Weak<Scene>,
+    /// The last scene that the card refused, and the number of triangles inserted into it.
+    refused: Option<(Weak<Scene>, usize)>,
     /// Warnings that nobody has taken yet.
     warnings: Vec<String>,
 }
@@ -59,18 +59,25 @@ impl Renderer {
 
     /// Uploads a scene to the card; `None` without a card, or with a warning if the card refuses the scene.
     pub fn tracer(&self, lit: &LitScene, objects: &[Inserted<'_>]) -> Option<Tracer> {
-        let mut state = self.state();
-        let card = state.card.clone()?;
         let scene = &lit.scene;
-        if state.refused.as_ptr() == Arc::as_ptr(scene) {
-            return None;
-        }
-        let known = state.geometry.as_ref();
-        let known = known.filter(|(of, _)| objects.is_empty() && of.as_ptr() == Arc::as_ptr(scene));
+        let is_this = |other: &Weak<Scene>| other.as_ptr() == Arc::as_ptr(scene);
+        let inserted = objects.iter().map(|object| object.corners.len()).sum();
+        let (card, known) = {
+            let state = self.state();
+            let refused = state.refused.as_ref();
+            if refused.is_some_and(|(of, least)| is_this(of) && inserted >= *least) {
+                return None;
+            }
+            let card = state.card.clone()?;
+            let known = state.geometry.as_ref();
+            let known = known.filter(|(of, _)| objects.is_empty() && is_this(of));
+            (card, known.map(|(_, geometry)| geometry.clone()))
+        };
         let made = match known {
-            Some((_, geometry)) => Tracer::on(&card, geometry.clone(), lit, objects),
+            Some(geometry) => Tracer::on(&card, geometry, lit, objects),
             None => Tracer::new(&card, lit, objects),
         };
+        let mut state = self.state();
         match made {
             Ok(tracer) => {
                 if objects.is_empty() {
@@ -78,30 +85,44 @@ impl Renderer {
                 }
                 Some(tracer)
             }
+            Err(error) if card.is_lost() => {
+                drop(state);
+                self.give_up(&error);
+                None
+            }
             Err(error) => {
-                state.refused = Arc::downgrade(scene);
+                state.refused = Some((Arc::downgrade(scene), inserted));
                 state.warn(&error);
                 None
             }
         }
     }
 
-    /// Does work on the card with what is there; `None` if nothing is, or if the card failed: then it is given up with a warning.
+    /// Runs `act` on the card; `None` without a tracer, or if the card failed: it is then no longer used, and a warning is given.
     pub fn on_card<W, C, T>(
         &self,
         work: &mut W,
-        there: &mut Option<C>,
+        tracer: &mut Option<C>,
         act: impl FnOnce(&mut W, &mut C) -> Result<T>,
     ) -> Option<T> {
-        let done = act(work, there.as_mut()?);
+        let done = act(work, tracer.as_mut()?);
         if let Err(error) = &done {
-            let mut state = self.state();
-            state.card = None;
-            state.geometry = None;
-            state.warn(error);
-            *there = None;
+            self.give_up(error);
+            *tracer = None;
         }
         done.ok()
+    }
+
+    /// Leaves the card for good. The first who finds it failed warns.
+    fn give_up(&self, error: &Error) {
+        let mut state = self.state();
+        let (card, geometry) = (state.card.take(), state.geometry.take());
+        if card.is_some() {
+            state.warn(error);
+        }
+        // The last clone waits for the card, which others need not.
+        drop(state);
+        drop((card, geometry));
     }
 
     /// Warnings since the last call.

@@ -45,8 +45,8 @@ const SMALL_RELIT: (u32, u32) = (400, 4);
 struct Relit {
     relighting: Relighting,
     lights: [Arc<LitScene>; 2],
-    /// The scene in both lights on the graphics card; made once.
-    tracers: Option<Option<[Tracer; 2]>>,
+    /// The scene in both lights on the graphics card.
+    tracers: Option<[Tracer; 2]>,
     /// Smaller renders, which come first.
     small: Option<Relighting>,
     light: Light,
@@ -89,10 +89,18 @@ impl Relit {
             return done;
         }
         // Denoising takes longer than a sample, so it is done when the samples have doubled.
-        let tracers = self.tracers.get_or_insert_with(|| {
-            let [before, after] = &self.lights;
+        let both = |[before, after]: &[Arc<LitScene>; 2]| {
             Some([renderer.tracer(before, &[])?, renderer.tracer(after, &[])?])
-        });
+        };
+        let mut none = None;
+        let tracers = match self.relighting.is_between_passes() {
+            true if self.tracers.is_none() => {
+                self.tracers = both(&self.lights);
+                &mut self.tracers
+            }
+            true => &mut self.tracers,
+            false => &mut none,
+        };
         let on_card =
             |r: &mut Relighting, card: &mut [Tracer; 2]| r.refine_on(card, samples, &go_on);
         let relighting = &mut self.relighting;
@@ -118,8 +126,8 @@ struct Placed {
     /// Samples of `picture`; 0 while it is the first look.
     samples: u32,
     picture: Arc<Picture>,
-    /// The scene with the objects on the graphics card; made once.
-    tracer: Option<Option<Tracer>>,
+    /// The scene with the objects on the graphics card.
+    tracer: Option<Tracer>,
 }
 
 impl Placed {
@@ -164,13 +172,13 @@ impl Placed {
         self.samples = if sampled { self.samples() } else { 0 };
     }
 
-    /// Uploads the scene with the objects to the graphics card, unless that was done before.
+    /// Uploads the scene with the objects to the graphics card, unless it is there.
     fn upload(&mut self, renderer: &Renderer) {
         let composite = &self.inserted.composite;
-        self.tracer.get_or_insert_with(|| {
+        if self.tracer.is_none() {
             let objects = composite.objects.iter().map(|object| object.for_card());
-            renderer.tracer(&composite.lit, &objects.collect::<Vec<_>>())
-        });
+            self.tracer = renderer.tracer(&composite.lit, &objects.collect::<Vec<_>>());
+        }
     }
 
     /// Samples both insertions up to `samples` together. Returns whether the picture changed.
@@ -179,8 +187,7 @@ impl Placed {
         let mut refine = |half: &mut Composite, samples| {
             let on_card =
                 |half: &mut Composite, card: &mut Tracer| half.refine_on(card, samples, &go_on);
-            let tracer = self.tracer.as_mut();
-            let done = tracer.and_then(|tracer| renderer.on_card(half, tracer, on_card));
+            let done = renderer.on_card(half, &mut self.tracer, on_card);
             done.unwrap_or_else(|| half.refine_to(samples, &go_on))
         };
         let done = refine(half, samples.div_ceil(2)) && refine(other, samples / 2);

@@ -105,6 +105,7 @@ impl Film {
         } else {
             1.0 / f64::from(self.samples)
         };
-        self.sums.iter().map(|s| (*s * scale).as_vec3()).collect()
+        let means = self.sums.par_iter().map(|s| (*s * scale).as_vec3());
+        means.collect()
     }
 }

@@ -37,8 +37,8 @@ fn main() {
     };
     let (rays, samples, runs) = (number(1 << 20), number(16), number(5));
     let Some(card) = Card::open(adapters) else {
-        println!("no graphics card");
-        return;
+        eprintln!("no graphics card");
+        std::process::exit(1);
     };
     println!(
         "{} beside {} threads; {runs} paired runs of {rays} rays and of {samples} samples a pixel",
@@ -194,10 +194,11 @@ impl<'a> Painters<'a> {
         }
     }
 
-    /// Both make a picture and return the number of its rays.
+    /// Both add samples to a picture of their own and return the number of its rays.
     fn each(&mut self, samples: u32) -> [Box<dyn FnMut() -> usize + '_>; 2] {
         let (lit, camera, options) = (self.lit, self.camera, &self.options);
         let tracer = &mut self.tracer;
+        let [mut card, mut processor] = [Film::new(camera), Film::new(camera)];
         let by_card = move || {
             let view = View {
                 camera,
@@ -205,15 +206,14 @@ impl<'a> Painters<'a> {
                 seed: SEED,
                 frame: 0,
             };
-            let film = tracer.film(&view, samples).expect("the card works");
-            std::hint::black_box(film.mean());
-            film.rays as usize
+            tracer.add(&mut card, &view, samples).expect("the card works");
+            std::hint::black_box(card.mean());
+            card.rays as usize
         };
         let by_processor = move || {
-            let mut film = Film::new(camera);
-            film.add(lit, camera, options, SEED, 0, samples);
-            std::hint::black_box(film.mean());
-            film.rays as usize
+            processor.add(lit, camera, options, SEED, 0, samples);
+            std::hint::black_box(processor.mean());
+            processor.rays as usize
         };
         [Box::new(by_card), Box::new(by_processor)]
     }

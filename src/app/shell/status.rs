@@ -5,6 +5,7 @@ use crate::app::controls::named;
 use crate::app::number::number;
 use crate::app::request::Requests;
 use crate::app::shell::Memory;
+use crate::app::state::Jobs;
 use crate::app::task::Task;
 use crate::app::theme;
 use crate::app::view::Parts;
@@ -49,7 +50,7 @@ pub fn ending(why: Termination) -> &'static str {
     }
 }
 
-pub fn bar(ui: &mut Ui, parts: &mut Parts<'_>, batch: Option<&Batch>) {
+pub fn bar(ui: &mut Ui, parts: &mut Parts<'_>, jobs: &Jobs) {
     let (document, tokens) = (parts.document, theme::tokens(ui));
     let bytes = parts.view.shell.memory.bytes();
     let snapshot = &document.snapshot;
@@ -78,7 +79,7 @@ pub fn bar(ui: &mut Ui, parts: &mut Parts<'_>, batch: Option<&Batch>) {
             let count = progress.stages.len();
             ui.label(format!("after stage {count}: {}", stage.name));
         }
-        if let Some(batch) = batch {
+        if let Some(batch) = &jobs.batch {
             photographs(ui, batch, parts.requests);
         }
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
@@ -92,7 +93,12 @@ pub fn bar(ui: &mut Ui, parts: &mut Parts<'_>, batch: Option<&Batch>) {
             ui.label(duration(progress.seconds))
                 .on_hover_text("Seconds of solving, pauses excluded");
             ui.separator();
-            ui.label(format!("{} rays/s", magnitude(snapshot.rays_per_second)));
+            let card = jobs.renderer.card();
+            let card = card.as_deref().unwrap_or("none");
+            ui.label(format!("{} rays/s", magnitude(snapshot.rays_per_second)))
+                .on_hover_text(format!(
+                    "Rays of the solve, by the processor. Graphics card for pictures: {card}"
+                ));
             ui.separator();
             let rate = number(snapshot.iterations_per_second as f32);
             ui.label(format!("{rate} iterations/s"));

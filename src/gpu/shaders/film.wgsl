@@ -82,7 +82,11 @@ fn insert(@builtin(global_invocation_id) id: vec3<u32>) {
     if pixel == NONE {
         return;
     }
-    let word = INSERT_WORDS * (pixel - dispatch.paths.w);
+    var over = vec4<f32>(0.0);
+    var under = vec4<f32>(0.0);
+    var covered_over = vec4<f32>(0.0);
+    var covered_under = vec4<f32>(0.0);
+    var counts = vec4<u32>(0u);
     for (var i = 0u; i < dispatch.paths.x; i += 1u) {
         let ray = begin_sample(pixel, dispatch.slice.w + i);
         let state = stream_state;
@@ -105,15 +109,18 @@ fn insert(@builtin(global_invocation_id) id: vec3<u32>) {
         // Drop pairs as a whole, else the difference would be biased.
         let rejected = with_objects.rejected || without.rejected;
         let keep = select(1.0, 0.0, rejected);
-        let over = with_objects.radiance * keep;
-        let under = without.radiance * keep;
-        add_to_film(word, vec4<f32>(over, f32(covered)));
-        add_to_film(word + 1u, vec4<f32>(under, 0.0));
-        if covered {
-            add_to_film(word + 2u, vec4<f32>(over, 0.0));
-            add_to_film(word + 3u, vec4<f32>(under, 0.0));
-        }
-        let changed = covered || any(over != under);
-        film[word + 4u] += vec4<u32>(with_objects.rays + without.rays, u32(rejected), u32(changed), 0u);
+        let pair = array(with_objects.radiance * keep, without.radiance * keep);
+        over += vec4<f32>(pair[0], f32(covered));
+        under += vec4<f32>(pair[1], 0.0);
+        covered_over += vec4<f32>(pair[0], 0.0) * f32(covered);
+        covered_under += vec4<f32>(pair[1], 0.0) * f32(covered);
+        let changed = covered || any(pair[0] != pair[1]);
+        counts += vec4<u32>(with_objects.rays + without.rays, u32(rejected), u32(changed), 0u);
     }
+    let word = INSERT_WORDS * (pixel - dispatch.paths.w);
+    add_to_film(word, over);
+    add_to_film(word + 1u, under);
+    add_to_film(word + 2u, covered_over);
+    add_to_film(word + 3u, covered_under);
+    film[word + 4u] += counts;
 }

@@ -13,6 +13,7 @@ use crate::session::save::staging::Staging;
 use crate::session::view::difference;
 use crate::session::view::hits::Hits;
 use crate::transport::denoise::guides;
+use rayon::prelude::*;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -26,6 +27,9 @@ pub const KINDS: [&str; 6] = ["render", "albedo", "emission", "error", "stderr",
 const PATHS: u64 = 4_000_000;
 /// ... within this range of samples per pixel.
 const SAMPLES: (u64, u64) = (4, 64);
+
+/// Writes a picture for viewing to a file.
+type Show<'a> = &'a (dyn Fn(&Path) -> Result<()> + Sync);
 
 /// Renders and writes the pictures of the chosen frames, `views/NNN.KIND.{exr,png}`. Only `render.png` is denoised.
 pub(super) fn write(staging: &mut Staging, results: &Results) -> Result<()> {
@@ -75,19 +79,25 @@ pub(super) fn write(staging: &mut Staging, results: &Results) -> Result<()> {
         let stderr = hits.stderr(scene, &estimate);
         let seen = hits.seen(scene, &estimate);
 
+        let emission_at = percentile_exposure(&emission.pixels);
+        let shown: [Show<'_>; 6] = [
+            &|path| write_png(path, &clean, shown_at),
+            &|path| write_png(path, &albedo, 1.0),
+            &|path| write_png(path, &emission, emission_at),
+            &|path| write_signed(path, &error, "radiance"),
+            &|path| write_magnitude(path, &stderr, "albedo"),
+            &|path| write_magnitude(path, &seen, "pixels"),
+        ];
+        let pictures = [&render, &albedo, &emission, &error, &stderr, &seen];
         let mut path =
             |kind: &str, ending: &str| staging.file(format!("{FOLDER}/{index:03}.{kind}.{ending}"));
-        let pictures = [&render, &albedo, &emission, &error, &stderr, &seen];
-        for (kind, picture) in KINDS.into_iter().zip(pictures) {
-            write_rgb(&path(kind, "exr")?, picture, Precision::Float)?;
-        }
-        write_png(&path("render", "png")?, &clean, shown_at)?;
-        write_png(&path("albedo", "png")?, &albedo, 1.0)?;
-        let emission_at = percentile_exposure(&emission.pixels);
-        write_png(&path("emission", "png")?, &emission, emission_at)?;
-        write_signed(&path("error", "png")?, &error, "radiance")?;
-        write_magnitude(&path("stderr", "png")?, &stderr, "albedo")?;
-        write_magnitude(&path("seen", "png")?, &seen, "pixels")?;
+        let paths = KINDS.map(|kind| Ok([path(kind, "exr")?, path(kind, "png")?]));
+        let paths: Vec<[PathBuf; 2]> = paths.into_iter().collect::<Result<_>>()?;
+        let files = paths.par_iter().zip(pictures).zip(shown);
+        files.try_for_each(|(([exr, png], picture), show)| {
+            write_rgb(exr, picture, Precision::Float)?;
+            show(png)
+        })?;
     }
     Ok(())
 }

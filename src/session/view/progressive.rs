@@ -26,15 +26,15 @@ pub struct Progressive {
     width: usize,
     height: usize,
     pub split: Option<Arc<Split>>,
-    /// Sums by rows, all layers of a pixel together; without a split, of every other pass.
+    /// Sums by rows, all layers of a pixel together; without a split, of even passes.
     sums: Vec<DVec3>,
-    /// Sums of the other passes, without a split: an independent half for estimating the noise.
+    /// Sums of odd passes, without a split: an independent half for estimating the noise.
     half: Vec<DVec3>,
     /// Number of samples in `half`.
     half_weight: f64,
     /// Whether to reduce the weight of earlier samples at the end of the pass.
     fades: bool,
-    /// Number of samples in both, in whole passes.
+    /// Number of samples in `sums` and `half` together, in whole passes.
     weight: f64,
     pass: u32,
     row: usize,
@@ -132,7 +132,7 @@ impl Progressive {
     /// Renders a pass without a split on the graphics card; call it only between passes.
     ///
     /// # Errors
-    /// The card failed; the render is unchanged.
+    /// The card failed. The render is unchanged if its pixels fit one buffer of the card, as 8 million do.
     pub fn add_on(
         &mut self,
         tracer: &mut Tracer,
@@ -157,19 +157,21 @@ impl Progressive {
     }
 
     fn sums_of_pass(&mut self) -> &mut [DVec3] {
-        match self.is_other_pass() {
+        match self.is_odd_pass() {
             true => &mut self.half,
             false => &mut self.sums,
         }
     }
 
     /// Whether the samples of this pass belong to `half`.
-    fn is_other_pass(&self) -> bool {
+    fn is_odd_pass(&self) -> bool {
         self.split.is_none() && self.pass % 2 == 1
     }
 
     fn end_pass(&mut self) {
-        self.half_weight += f64::from(u8::from(self.is_other_pass()));
+        if self.is_odd_pass() {
+            self.half_weight += 1.0;
+        }
         self.row = 0;
         self.pass += 1;
         self.weight += 1.0;

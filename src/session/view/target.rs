@@ -42,8 +42,8 @@ pub struct Target {
     hits: Option<Hits>,
     world: LitScene,
     render: Progressive,
-    /// The scene on the graphics card; made once.
-    tracer: Option<Option<Tracer>>,
+    /// The scene on the graphics card.
+    tracer: Option<Tracer>,
     /// The newest complete render, and its samples per pixel.
     rendered: Option<(Arc<Picture>, u32)>,
     /// Whether the render is shown.
@@ -188,11 +188,13 @@ impl Target {
     fn sample(&mut self, renderer: &Renderer, options: &PathOptions) -> bool {
         let (render, camera) = (&mut self.render, &self.camera);
         if render.split.is_none() && render.is_between_passes() {
-            let tracer = (self.tracer).get_or_insert_with(|| renderer.tracer(&self.world, &[]));
+            if self.tracer.is_none() {
+                self.tracer = renderer.tracer(&self.world, &[]);
+            }
             let pass = |render: &mut Progressive, tracer: &mut Tracer| {
                 render.add_on(tracer, camera, options)
             };
-            if renderer.on_card(render, tracer, pass).is_some() {
+            if (renderer.on_card(render, &mut self.tracer, pass)).is_some() {
                 return true;
             }
         }
