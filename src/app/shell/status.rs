@@ -5,7 +5,6 @@ use crate::app::controls::named;
 use crate::app::number::number;
 use crate::app::request::Requests;
 use crate::app::shell::Memory;
-use crate::app::state::Jobs;
 use crate::app::task::Task;
 use crate::app::theme;
 use crate::app::view::Parts;
@@ -50,7 +49,7 @@ pub fn ending(why: Termination) -> &'static str {
     }
 }
 
-pub fn bar(ui: &mut Ui, parts: &mut Parts<'_>, jobs: &Jobs) {
+pub fn bar(ui: &mut Ui, parts: &mut Parts<'_>, batch: Option<&Batch>, card: Option<String>) {
     let (document, tokens) = (parts.document, theme::tokens(ui));
     let bytes = parts.view.shell.memory.bytes();
     let snapshot = &document.snapshot;
@@ -79,7 +78,7 @@ pub fn bar(ui: &mut Ui, parts: &mut Parts<'_>, jobs: &Jobs) {
             let count = progress.stages.len();
             ui.label(format!("after stage {count}: {}", stage.name));
         }
-        if let Some(batch) = &jobs.batch {
+        if let Some(batch) = batch {
             photographs(ui, batch, parts.requests);
         }
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
@@ -93,7 +92,6 @@ pub fn bar(ui: &mut Ui, parts: &mut Parts<'_>, jobs: &Jobs) {
             ui.label(duration(progress.seconds))
                 .on_hover_text("Seconds of solving, pauses excluded");
             ui.separator();
-            let card = jobs.renderer.card();
             let card = card.as_deref().unwrap_or("none");
             ui.label(format!("{} rays/s", magnitude(snapshot.rays_per_second)))
                 .on_hover_text(format!(

@@ -37,13 +37,16 @@ pub fn standard_errors(
         prior_weight: texture.prior_weight,
     };
     let data = measurements.observations.diagonal(&measurements.weights);
-    let mut squares = vec![Vec3::ZERO; count];
-    for draw in 0..DRAWS {
+    let deviations = (0..DRAWS).into_par_iter().map(|draw| {
         let right = perturbation(&system, seed, object, draw);
         let mut deviation = vec![Vec3::ZERO; count];
         for _ in 0..3 {
             system.solve(&data, &right, &mut deviation);
         }
+        deviation
+    });
+    let mut squares = vec![Vec3::ZERO; count];
+    for deviation in deviations.collect::<Vec<_>>() {
         for (square, d) in squares.iter_mut().zip(&deviation) {
             *square += *d * *d / DRAWS as f32;
         }

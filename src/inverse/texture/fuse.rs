@@ -45,6 +45,11 @@ pub struct Problem<'a> {
 
 /// Finds the colours for the strength λ of the penalty, starting from `start`.
 pub fn fuse(problem: &Problem, strength: f32, start: &[Vec3]) -> Vec<Vec3> {
+    // On a thread of the pool, where small parallel loops cost nothing.
+    rayon::scope(|_| fuse_here(problem, strength, start))
+}
+
+fn fuse_here(problem: &Problem, strength: f32, start: &[Vec3]) -> Vec<Vec3> {
     let Problem {
         observations,
         weights: row_weights,

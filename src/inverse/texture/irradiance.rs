@@ -215,7 +215,8 @@ impl Irradiance {
         let mut best = (f64::INFINITY, STRENGTHS[0], 0.0);
         let mut worse = 0;
         for strength in STRENGTHS {
-            smooth = [0, 1].map(|s| fuse(&problem(&self.sets[s]), strength, &smooth[s]));
+            let fused = |s: usize| fuse(&problem(&self.sets[s]), strength, &smooth[s]);
+            smooth = rayon::join(|| fused(0), || fused(1)).into();
             let error = squares(&smooth[0], &self.sets[1]) + squares(&smooth[1], &self.sets[0]);
             let noise = squares(&smooth[0], &smooth[1]) / (3 * count.max(1)) as f64;
             if error < best.0 {
