@@ -3,14 +3,16 @@
 use crate::error::Result;
 use crate::gpu::buffers::storage;
 use crate::gpu::card::Card;
-use crate::gpu::layout::{NONE, TRIANGLE_WORDS};
+use crate::gpu::layout::{NONE, TRIANGLE_WORDS, WORKGROUP};
 use crate::gpu::materials::Inserted;
 use crate::scene::Scene;
 use crate::scene::bvh::Tree;
 use glam::Vec3;
 
-/// Stack sizes are multiples of this, so that few shaders are compiled.
+/// Stack sizes are multiples of this, so that few shaders are compiled, ...
 const STACK_STEP: u32 = 16;
+/// ... up to what fits the memory of a workgroup that every card has: 16,352 bytes of "downlevel" limits.
+const MAX_STACK: u32 = 16_352 / (4 * WORKGROUP);
 
 /// Triangles and their hierarchy. The materials of a scene come one per object, then those of each inserted object.
 #[derive(Debug)]
@@ -42,6 +44,14 @@ impl Geometry {
         }
 
         let tree = Tree::new(&corners);
+        let stack_size = tree
+            .depth()
+            .max(1)
+            .next_multiple_of(STACK_STEP)
+            .min(MAX_STACK);
+        if tree.depth() > MAX_STACK {
+            return Err(card.failed("the scene's hierarchy is too deep".to_owned()));
+        }
         let mut slot_of = vec![NONE; corners.len()];
         let mut triangles = Vec::with_capacity(TRIANGLE_WORDS * corners.len());
         for (slot, &index) in tree.order.iter().enumerate() {
@@ -57,7 +67,7 @@ impl Geometry {
             nodes: storage(card, "hierarchy", &nodes(&tree))?,
             triangles: storage(card, "triangles", &triangles)?,
             slot_of,
-            stack_size: tree.depth().max(1).next_multiple_of(STACK_STEP),
+            stack_size,
         })
     }
 }

@@ -67,7 +67,11 @@ impl Pipelines {
             layout: Some(&layout),
             module: &module,
             entry_point: Some(kernel.name),
-            compilation_options: Default::default(),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                // A stack's entries are written before they are read.
+                zero_initialize_workgroup_memory: false,
+                ..Default::default()
+            },
             cache: None,
         })
     }

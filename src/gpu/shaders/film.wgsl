@@ -47,7 +47,8 @@ fn add_to_film(word: u32, value: vec4<f32>) {
 
 // A thread begins its next sample as soon as a path ends: threads of a group would otherwise wait for the longest path.
 @compute @workgroup_size(WORKGROUP)
-fn render(@builtin(global_invocation_id) id: vec3<u32>) {
+fn render(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) index_in_group: u32) {
+    lane = index_in_group;
     let pixel = pixel_of(id.x);
     if pixel == NONE {
         return;
@@ -77,7 +78,8 @@ fn render(@builtin(global_invocation_id) id: vec3<u32>) {
 
 // Pairs of paths with and without the inserted objects, from the same random numbers (`compose::insert`).
 @compute @workgroup_size(WORKGROUP)
-fn insert(@builtin(global_invocation_id) id: vec3<u32>) {
+fn insert(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) index_in_group: u32) {
+    lane = index_in_group;
     let pixel = pixel_of(id.x);
     if pixel == NONE {
         return;
@@ -90,32 +92,38 @@ fn insert(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var i = 0u; i < dispatch.paths.x; i += 1u) {
         let ray = begin_sample(pixel, dispatch.slice.w + i);
         let state = stream_state;
-        with_inserted = true;
-        let first = traverse(ray, false);
-        var covered = false;
-        if first.slot != NONE {
-            covered = is_inserted(first.slot);
-        }
         affected = false;
-        let with_objects = radiance(ray);
-        // A path that no object affected is the same without them.
-        var without = with_objects;
-        without.rays = 0u;
-        if affected {
+        var pair = array(vec3<f32>(0.0), vec3<f32>(0.0));
+        var rays = 0u;
+        var rejected = false;
+        var covered = false;
+        // Both paths in one loop: drivers compile each place that traces a path anew.
+        for (var objects = 1i; objects >= 0i; objects -= 1i) {
+            with_inserted = objects == 1i;
             stream_state = state;
-            with_inserted = false;
-            without = radiance(ray);
+            let path = radiance(ray);
+            rays += path.rays;
+            rejected = rejected || path.rejected;
+            if with_inserted {
+                covered = path.starts_on_inserted;
+                pair[0] = path.radiance;
+            }
+            pair[1] = path.radiance;
+            // A path that no object affected is the same without them.
+            if !affected {
+                break;
+            }
         }
         // Drop pairs as a whole, else the difference would be biased.
-        let rejected = with_objects.rejected || without.rejected;
         let keep = select(1.0, 0.0, rejected);
-        let pair = array(with_objects.radiance * keep, without.radiance * keep);
+        pair[0] *= keep;
+        pair[1] *= keep;
         over += vec4<f32>(pair[0], f32(covered));
         under += vec4<f32>(pair[1], 0.0);
         covered_over += vec4<f32>(pair[0], 0.0) * f32(covered);
         covered_under += vec4<f32>(pair[1], 0.0) * f32(covered);
         let changed = covered || any(pair[0] != pair[1]);
-        counts += vec4<u32>(with_objects.rays + without.rays, u32(rejected), u32(changed), 0u);
+        counts += vec4<u32>(rays, u32(rejected), u32(changed), 0u);
     }
     let word = INSERT_WORDS * (pixel - dispatch.paths.w);
     add_to_film(word, over);

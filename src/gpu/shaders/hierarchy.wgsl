@@ -121,8 +121,11 @@ fn test_triangle(slot: u32, ray: Ray, shear: Shear, nearest: ptr<function, Hit>)
     }
 }
 
-// Private, since WGSL fills a function's variables with zeros at each call.
-var<private> stack: array<u32, STACK_SIZE>;
+// The stacks of a group's threads, entry by entry. In a thread's own memory they would be filled with zeros at each call, and some
+// drivers compile an indexed array of its own into a branch for each entry.
+var<workgroup> stacks: array<u32, STACK_SIZE * WORKGROUP>;
+// The index of the thread in its group.
+var<private> lane: u32;
 
 fn traverse(ray: Ray, any_hit: bool) -> Hit {
     var nearest = Hit(ray.t_max, NONE, 0.0, 0.0, NONE);
@@ -144,7 +147,7 @@ fn traverse(ray: Ray, any_hit: bool) -> Hit {
             if min(left, right) < FAR {
                 let swapped = right < left;
                 if max(left, right) < FAR {
-                    stack[depth] = select(first + 1u, first, swapped);
+                    stacks[depth * WORKGROUP + lane] = select(first + 1u, first, swapped);
                     depth += 1u;
                 }
                 node = select(first, first + 1u, swapped);
@@ -168,7 +171,7 @@ fn traverse(ray: Ray, any_hit: bool) -> Hit {
             break;
         }
         depth -= 1u;
-        node = stack[depth];
+        node = stacks[depth * WORKGROUP + lane];
     }
     if nearest.slot != NONE && is_inserted(nearest.slot) {
         affected = true;

@@ -13,6 +13,7 @@ struct Path {
     total: vec3<f32>,
     rays: u32,
     bounce: u32,
+    starts_on_inserted: bool,
     // Of `ray`'s direction; negative for the camera ray, which has no competing light sample.
     bsdf_pdf: f32,
 }
@@ -22,6 +23,8 @@ struct PathSample {
     radiance: vec3<f32>,
     rays: u32,
     rejected: bool,
+    // Whether the first hit is an inserted object.
+    starts_on_inserted: bool,
 }
 
 // The frame around a unit vector (Duff et al. 2017).
@@ -90,12 +93,13 @@ fn direct_light(surface: Surface, local: Frame, wo: vec3<f32>, rays: ptr<functio
 }
 
 fn begin_path(camera_ray: Ray) -> Path {
-    return Path(camera_ray, vec3<f32>(1.0), vec3<f32>(0.0), 0u, 0u, -1.0);
+    return Path(camera_ray, vec3<f32>(1.0), vec3<f32>(0.0), 0u, 0u, false, -1.0);
 }
 
 fn end_path(path: Path) -> PathSample {
     let rejected = !is_finite(path.total);
-    return PathSample(select(path.total, vec3<f32>(0.0), rejected), path.rays, rejected);
+    let total = select(path.total, vec3<f32>(0.0), rejected);
+    return PathSample(total, path.rays, rejected, path.starts_on_inserted);
 }
 
 // Adds the next vertex; false if the path ended there.
@@ -115,6 +119,9 @@ fn extend(path: ptr<function, Path>) -> bool {
         return false;
     }
     let surface = surface_at(hit, ray);
+    if (*path).bounce == 0u {
+        (*path).starts_on_inserted = is_inserted(hit.slot);
+    }
 
     // Add emission.
     let wo = -normal_or(ray.direction, vec3<f32>(0.0));

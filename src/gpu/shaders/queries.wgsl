@@ -1,7 +1,8 @@
 // Ray queries: reads (origin, t_max) and (direction, any), writes (t, b1, b2) and the triangle's index.
 
 @compute @workgroup_size(WORKGROUP)
-fn trace(@builtin(global_invocation_id) id: vec3<u32>) {
+fn trace(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) index_in_group: u32) {
+    lane = index_in_group;
     let index = pixel_of(id.x);
     if index == NONE {
         return;
