@@ -73,8 +73,8 @@ impl Window {
             bar(ui, line, 8, 4).show(ui, |ui| sessions::line(ui, parts, name));
         }
         let (status, jobs) = (Panel::bottom("status").exact_size(24.0), &app.jobs);
-        let (batch, card) = (jobs.batch.as_ref(), jobs.renderer.card());
-        bar(ui, status, 8, 2).show(ui, |ui| status::bar(ui, parts, batch, card));
+        let (batch, renderer) = (jobs.batch.as_ref(), &jobs.renderer);
+        bar(ui, status, 8, 2).show(ui, |ui| status::bar(ui, parts, batch, renderer));
         if start_page {
             return;
         }

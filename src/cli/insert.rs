@@ -42,6 +42,7 @@ pub struct InsertArguments {
 /// Inserts objects and writes the composites. Returns the exit code.
 pub fn insert(arguments: &InsertArguments) -> Result<i32> {
     arguments.replace.apply();
+    let renderer = arguments.device.renderer()?;
     let loaded = arguments.saved.load()?;
     let work = Photographs {
         frames: match arguments.frame {
@@ -57,7 +58,7 @@ pub fn insert(arguments: &InsertArguments) -> Result<i32> {
         samples: arguments.spp,
         denoise: arguments.denoise.denoiser(true)?,
         finish: arguments.finish,
-        renderer: arguments.device.renderer()?,
+        renderer,
     };
     write_with_progress(&work, &|frame| match arguments.frame {
         FrameChoice::One(_) => arguments.out.clone(),

@@ -6,7 +6,7 @@ use crate::compose::backdrop::{Backdrop, LayeredPixel};
 use crate::compose::placement::PlacedObject;
 use crate::compose::world::FurnishedScene;
 use crate::error::Result;
-use crate::gpu::{PairSums, SAMPLES_AT_ONCE, Tracer, View};
+use crate::gpu::{PairSums, Tracer, View};
 use crate::math::picture::Picture;
 use crate::math::rng::Stream;
 use crate::scene::geometry::Ray;
@@ -171,11 +171,9 @@ impl Insertion {
             let rows = first..first + alike.take_while(|&&n| n == taken).count();
             first = rows.end;
             let pixels = (rows.start * width) as u32..(rows.end * width) as u32;
-            for from in (taken..samples).step_by(SAMPLES_AT_ONCE as usize) {
-                let to = samples.min(from + SAMPLES_AT_ONCE);
-                tracer.pairs(&view, pixels.clone(), from..to, |_, added| {
-                    self.accumulate(rows.clone(), to - from, added);
-                })?;
+            if taken < samples {
+                let added = tracer.pairs(&view, pixels, taken..samples)?;
+                self.accumulate(rows, samples - taken, &added);
             }
         }
         Ok(true)

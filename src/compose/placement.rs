@@ -3,10 +3,12 @@
 use crate::compose::object::ObjectModel;
 use crate::compose::object::surface::MaterialOverride;
 use crate::error::{Error, Result};
-use crate::gpu::Inserted;
+use crate::gpu::{Inserted, Tracer};
+use crate::render::Renderer;
 use crate::scene::Scene;
 use crate::scene::bvh::Bvh;
 use crate::scene::geometry::Ray;
+use crate::transport::lit::LitScene;
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -169,4 +171,14 @@ impl PlacedObject {
         let behind = to_center.dot(ray.direction) < 0.0 && to_center.length() > self.radius;
         distance <= self.radius + angle * to_center.length() && !behind
     }
+}
+
+/// A scene with objects on the renderer's graphics card; `None` if there is none that takes them.
+pub fn tracer(
+    renderer: &Renderer,
+    lit: &LitScene,
+    objects: &[Arc<PlacedObject>],
+) -> Option<Tracer> {
+    let inserted: Vec<Inserted<'_>> = objects.iter().map(|object| object.for_card()).collect();
+    renderer.tracer(lit, &inserted)
 }

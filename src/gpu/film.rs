@@ -10,7 +10,7 @@ use std::time::Instant;
 use wgpu::BufferUsages as Usage;
 
 /// Samples summed in f32 on the card before the sums are added in f64.
-pub const SAMPLES_AT_ONCE: u32 = 16;
+pub(super) const SAMPLES_AT_ONCE: u32 = 16;
 
 /// The buffer that the shader writes, a copy for the processor, and the bindings.
 #[derive(Debug)]
@@ -93,7 +93,7 @@ impl Tracer {
         samples: Range<u32>,
         bytes: u64,
     ) -> Result<()> {
-        let card = self.card.clone();
+        let card = &self.card;
         let Some(buffers) = &self.film else {
             return Err(card.failed("there is no film buffer".to_owned()));
         };

@@ -30,7 +30,6 @@ mod pipelines;
 mod tracer;
 
 pub use card::{Adapters, Card};
-pub use film::SAMPLES_AT_ONCE;
 pub use geometry::Geometry;
 pub use materials::Inserted;
 pub use pipelines::Checks;

@@ -217,8 +217,7 @@ impl Tracer {
         Ok(cast)
     }
 
-    /// Traces pairs of paths with and without the inserted objects, and calls `add` with ranges of the pixels and their sums of up
-    /// to [`SAMPLES_AT_ONCE`] samples.
+    /// Sums over pairs of paths with and without the inserted objects, for each of a range of pixels.
     ///
     /// # Errors
     /// The card failed.
@@ -227,14 +226,16 @@ impl Tracer {
         view: &View<'_>,
         pixels: Range<u32>,
         samples: Range<u32>,
-        mut add: impl FnMut(Range<u32>, &[PairSums]),
-    ) -> Result<()> {
+    ) -> Result<Vec<PairSums>> {
+        let first = pixels.start;
+        let mut sums = vec![PairSums::default(); pixels.len()];
         let description = with_view(self.description, view);
         self.dispatch_all(INSERT, description, pixels, samples, |pixels, words| {
+            let sums = &mut sums[(pixels.start - first) as usize..];
             let words = words.par_chunks_exact(INSERT.words as usize);
-            let sums: Vec<PairSums> = words.map(PairSums::from_words).collect();
-            add(pixels, &sums);
-        })
+            (sums.par_iter_mut().zip(words)).for_each(|(sum, w)| sum.add(&PairSums::from_words(w)));
+        })?;
+        Ok(sums)
     }
 
     /// The nearest hit of each ray, or any hit if `any`. Triangles of inserted objects count after the scene's; `t_min` is ignored.

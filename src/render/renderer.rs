@@ -98,6 +98,11 @@ impl Renderer {
         }
     }
 
+    /// Uploads a scene in two lights.
+    pub fn tracers(&self, [a, b]: &[Arc<LitScene>; 2]) -> Option<[Tracer; 2]> {
+        Some([self.tracer(a, &[])?, self.tracer(b, &[])?])
+    }
+
     /// Runs `act` on the card; `None` without a tracer, or if the card failed: it is then no longer used, and a warning is given.
     pub fn on_card<W, C, T>(
         &self,

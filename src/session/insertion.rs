@@ -5,7 +5,7 @@ use crate::compose::backdrop::{Backdrop, LayeredPixel};
 use crate::compose::denoise::denoised_composite;
 use crate::compose::first_look::first_look;
 use crate::compose::insert::Insertion as Composite;
-use crate::compose::placement::{PlacedObject, Placement};
+use crate::compose::placement::{self, PlacedObject, Placement};
 use crate::compose::relight::Relighting;
 use crate::error::{Error, Result};
 use crate::gpu::Tracer;
@@ -88,24 +88,18 @@ impl Relit {
             }
             return done;
         }
-        // Denoising takes longer than a sample, so it is done when the samples have doubled.
-        let both = |[before, after]: &[Arc<LitScene>; 2]| {
-            Some([renderer.tracer(before, &[])?, renderer.tracer(after, &[])?])
-        };
-        let mut none = None;
-        let tracers = match self.relighting.is_between_passes() {
-            true if self.tracers.is_none() => {
-                self.tracers = both(&self.lights);
-                &mut self.tracers
-            }
-            true => &mut self.tracers,
-            false => &mut none,
-        };
-        let on_card =
-            |r: &mut Relighting, card: &mut [Tracer; 2]| r.refine_on(card, samples, &go_on);
         let relighting = &mut self.relighting;
-        let done = renderer.on_card(relighting, tracers, on_card);
-        let done = done.unwrap_or_else(|| relighting.refine_to(samples, &go_on));
+        let mut by_card = None;
+        if relighting.is_between_passes() {
+            if self.tracers.is_none() {
+                self.tracers = renderer.tracers(&self.lights);
+            }
+            let on_card =
+                |r: &mut Relighting, card: &mut [Tracer; 2]| r.refine_on(card, samples, &go_on);
+            by_card = renderer.on_card(relighting, &mut self.tracers, on_card);
+        }
+        let done = by_card.unwrap_or_else(|| relighting.refine_to(samples, &go_on));
+        // Denoising takes longer than a sample, so it is done when the samples have doubled.
         let better = done && self.relighting.is_begun() && samples >= 2 * self.samples;
         if better {
             self.samples = samples;
@@ -176,8 +170,7 @@ impl Placed {
     fn upload(&mut self, renderer: &Renderer) {
         let composite = &self.inserted.composite;
         if self.tracer.is_none() {
-            let objects = composite.objects.iter().map(|object| object.for_card());
-            self.tracer = renderer.tracer(&composite.lit, &objects.collect::<Vec<_>>());
+            self.tracer = placement::tracer(renderer, &composite.lit, &composite.objects);
         }
     }
 

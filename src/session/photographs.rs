@@ -3,12 +3,12 @@
 use crate::compose::backdrop::Backdrop;
 use crate::compose::denoise::denoised;
 use crate::compose::insert::Insertion;
-use crate::compose::placement::{PlacedObject, Placement};
+use crate::compose::placement::{self, PlacedObject, Placement};
 use crate::compose::psf_and_grain::PsfAndGrain;
 use crate::compose::relight::Relighting;
 use crate::compose::write::{write_insertion, write_relit};
 use crate::error::Result;
-use crate::gpu::{self, Tracer};
+use crate::gpu::Tracer;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::render::Renderer;
@@ -92,10 +92,9 @@ impl Photographs {
             (self.relight).then(|| [&self.found, &self.edited].map(|e| Arc::new(e.lit(scene))));
         let placed = Some(&objects).filter(|objects| !objects.is_empty());
         let renderer = &self.renderer;
-        let mut tracer = placed.and_then(|objects| self.tracer(objects));
-        let mut relighters = lights.as_ref().and_then(|[before, after]| {
-            Some([renderer.tracer(before, &[])?, renderer.tracer(after, &[])?])
-        });
+        let mut tracer = placed
+            .and_then(|objects| placement::tracer(renderer, &self.edited.lit(scene), objects));
+        let mut relighters = (lights.as_ref()).and_then(|lights| renderer.tracers(lights));
         let parts = u8::from(lights.is_some()) + u8::from(!objects.is_empty());
         let mut unseen = !objects.is_empty() && !self.frames.is_empty();
         for (index, &frame) in self.frames.iter().enumerate() {
@@ -134,13 +133,6 @@ impl Photographs {
             written.warnings.push(none);
         }
         Ok(written)
-    }
-
-    /// The scene with the objects on the renderer's graphics card.
-    fn tracer(&self, objects: &[Arc<PlacedObject>]) -> Option<Tracer> {
-        let inserted: Vec<gpu::Inserted<'_>> = objects.iter().map(|o| o.for_card()).collect();
-        self.renderer
-            .tracer(&self.edited.lit(&self.capture.scene), &inserted)
     }
 
     /// The photograph, relit if there are two lights; `None` if the work was stopped.

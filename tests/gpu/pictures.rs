@@ -87,6 +87,14 @@ fn room_of(mesh: relit::capture::mesh::Mesh, materials: Vec<Material>) -> LitSce
     LitScene::new(Arc::new(scene), materials, None)
 }
 
+/// The room with a lamp, without its ceiling.
+fn open_room() -> LitScene {
+    let (mesh, materials) = lamp_room();
+    let ceiling = mesh.objects[3].clone();
+    let (mesh, materials) = without((mesh, materials), &[&ceiling]);
+    room_of(mesh, materials)
+}
+
 #[test]
 fn the_built_in_room_is_the_processors() {
     let lit = Room::new().lit([64, 48]).expect("the room is sound");
@@ -168,11 +176,8 @@ fn a_textured_room_is_the_processors() {
 
 #[test]
 fn an_open_room_with_light_from_outside_is_the_processors() {
-    // Without its ceiling, and lit by a bright patch of the sky as well as by the lamp.
-    let (mesh, materials) = lamp_room();
-    let ceiling = mesh.objects[3].clone();
-    let (mesh, materials) = without((mesh, materials), &[&ceiling]);
-    let mut lit = room_of(mesh, materials);
+    // Lit by a bright patch of the sky as well as by the lamp.
+    let mut lit = open_room();
     let pixels = (0..16 * 8).map(|i| match i {
         21 | 22 => Vec3::new(40.0, 30.0, 20.0),
         _ => Vec3::new(0.2, 0.3, 0.6) * (i % 3) as f32,
@@ -192,10 +197,7 @@ fn an_open_room_with_light_from_outside_is_the_processors() {
 /// The light of real scans: on a box around the mesh, other from above the horizon, with a sun that shines through some pixels.
 #[test]
 fn light_from_a_box_and_a_sun_is_the_processors() {
-    let (mesh, materials) = lamp_room();
-    let ceiling = mesh.objects[3].clone();
-    let (mesh, materials) = without((mesh, materials), &[&ceiling]);
-    let mut lit = room_of(mesh, materials);
+    let mut lit = open_room();
     let corners = lit.scene.positions.iter().copied();
     let around = Surroundings::around(corners).expect("points");
     let map = |bright: f32| {

@@ -9,6 +9,7 @@ use crate::app::task::Task;
 use crate::app::theme;
 use crate::app::view::Parts;
 use crate::inverse::solver::Termination;
+use crate::render::Renderer;
 use crate::session::photographs::{WriteProgress, Written};
 use crate::session::save::memory::resident_bytes;
 use crate::session::snapshot::Phase;
@@ -49,7 +50,7 @@ pub fn ending(why: Termination) -> &'static str {
     }
 }
 
-pub fn bar(ui: &mut Ui, parts: &mut Parts<'_>, batch: Option<&Batch>, card: Option<String>) {
+pub fn bar(ui: &mut Ui, parts: &mut Parts<'_>, batch: Option<&Batch>, renderer: &Renderer) {
     let (document, tokens) = (parts.document, theme::tokens(ui));
     let bytes = parts.view.shell.memory.bytes();
     let snapshot = &document.snapshot;
@@ -92,11 +93,14 @@ pub fn bar(ui: &mut Ui, parts: &mut Parts<'_>, batch: Option<&Batch>, card: Opti
             ui.label(duration(progress.seconds))
                 .on_hover_text("Seconds of solving, pauses excluded");
             ui.separator();
-            let card = card.as_deref().unwrap_or("none");
-            ui.label(format!("{} rays/s", magnitude(snapshot.rays_per_second)))
-                .on_hover_text(format!(
+            let rays = ui.label(format!("{} rays/s", magnitude(snapshot.rays_per_second)));
+            rays.on_hover_ui(|ui| {
+                let card = renderer.card();
+                let card = card.as_deref().unwrap_or("none");
+                ui.label(format!(
                     "Rays of the solve, by the processor. Graphics card for pictures: {card}"
                 ));
+            });
             ui.separator();
             let rate = number(snapshot.iterations_per_second as f32);
             ui.label(format!("{rate} iterations/s"));
