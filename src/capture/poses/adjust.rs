@@ -53,11 +53,14 @@ impl<'a> Adjustment<'a> {
         Self { tracks, lenses }
     }
 
-    /// Poses that fit the matches best, beginning with `poses`; `given` are the scan's.
-    pub fn adjust(&self, given: &[Pose], mut poses: Vec<Pose>) -> Vec<Pose> {
-        let Some(deviations) = self.deviations(given) else {
-            return poses;
-        };
+    /// Number of matches.
+    pub fn matches(&self) -> usize {
+        self.tracks.iter().map(|(_, seen)| seen.len()).sum()
+    }
+
+    /// Poses that fit the matches best, beginning with `poses`; `given` are the scan's, with standard deviations in metres along
+    /// each axis and in radians about each.
+    pub fn adjust(&self, given: &[Pose], mut poses: Vec<Pose>, deviations: [f64; 2]) -> Vec<Pose> {
         let mut depths = vec![0.0; self.tracks.len()];
         for _ in 0..STEPS {
             let Some(scale) = self.scale(&poses, &depths) else {
@@ -73,9 +76,9 @@ impl<'a> Adjustment<'a> {
         poses
     }
 
-    /// Standard deviations of the given poses, in metres along each axis and in radians about each: what moves points by the
-    /// median error of matches, which two poses share. They keep poses in place where photographs say nothing.
-    fn deviations(&self, given: &[Pose]) -> Option<[f64; 2]> {
+    /// The largest standard deviations that the given poses can have, in metres along each axis and in radians about each: what
+    /// moves points by the median error of matches, which two poses share. `None` without matches.
+    pub fn deviations(&self, given: &[Pose]) -> Option<[f64; 2]> {
         let error = self.median_error(given, 1)?;
         let mut depths: Vec<f64> = self
             .tracks

@@ -3,7 +3,7 @@
 //!
 //! Points with structure are found in every photograph ([`points`]), looked up in the photographs that see them too
 //! ([`matches`]; Lucas and Kanade 1981), and all poses are adjusted together (`adjust`; bundle adjustment, Triggs et al.
-//! 2000). A fifth of the points is held out; poses change only if those fit better too.
+//! 2000). A fifth of the points is held out; poses change only if those fit better too, and no further than those ask for.
 
 mod adjust;
 mod matches;
@@ -29,6 +29,11 @@ const MIN_GAIN: f64 = 0.75;
 const SMALL_ERROR: f64 = 0.5;
 /// Fewer matches of held-out points a photograph tell nothing: a few edges that happen to look alike fit any poses.
 const MIN_HELD_OUT: usize = 4;
+/// Standard deviations of the given poses that are tried, from tight to wide, as parts of the largest ones. A shift of a camera looks
+/// much like a turn: matches alone let cameras drift by several times what tracking was off.
+const DEVIATIONS: [f64; 5] = [1.0 / 16.0, 1.0 / 8.0, 1.0 / 4.0, 1.0 / 2.0, 1.0];
+/// Standard error of the median length of n two-dimensional normal vectors, relative to it: this over √n.
+const MEDIAN_ERROR: f64 = 0.72;
 /// More photographs are not refined: the equations of all poses are dense.
 const MAX_PHOTOGRAPHS: usize = 400;
 
@@ -58,18 +63,25 @@ pub fn refine(frames: &mut [ImportedFrame], chosen: &[usize]) -> Result<Option<S
     for round in 0..ROUNDS {
         seen = matches::look_up(&points, &pictures, &poses, round == 0);
         let fitted = Adjustment::new(&points, &seen, &lenses, |point| point % HELD_OUT != 0);
-        poses = fitted.adjust(&given, poses);
+        let Some(widest) = fitted.deviations(&given) else {
+            return Ok(None);
+        };
+        poses = fitted.adjust(&given, poses, widest);
     }
 
     let held_out = Adjustment::new(&points, &seen, &lenses, |point| point % HELD_OUT == 0);
+    let fitted = Adjustment::new(&points, &seen, &lenses, |point| point % HELD_OUT != 0);
     let least = MIN_HELD_OUT * chosen.len();
-    let (Some(before), Some(after)) = (
-        held_out.median_error(&given, least),
-        held_out.median_error(&poses, least),
-    ) else {
+    let Some(before) = held_out.median_error(&given, least) else {
         return Ok(None);
     };
-    if before < SMALL_ERROR || after > MIN_GAIN * before {
+    if before < SMALL_ERROR {
+        return Ok(None);
+    }
+    let Some((poses, after)) = nearest(&fitted, &held_out, &given, &poses) else {
+        return Ok(None);
+    };
+    if after > MIN_GAIN * before {
         return Ok(None);
     }
     let (mut max_shift, mut max_turn) = (0.0_f64, 0.0_f64);
@@ -84,4 +96,34 @@ pub fn refine(frames: &mut [ImportedFrame], chosen: &[usize]) -> Result<Option<S
         1e3 * max_shift,
         max_turn.to_degrees()
     )))
+}
+
+/// The poses nearest to the given ones that fit held-out points as well as any, within one standard error (Breiman et al. 1984), and
+/// the median error of these points in pixels. Shifts are bounded first, then turns.
+fn nearest(
+    fitted: &Adjustment,
+    held_out: &Adjustment,
+    given: &[Pose],
+    poses: &[Pose],
+) -> Option<(Vec<Pose>, f64)> {
+    let mut deviations = fitted.deviations(given)?;
+    let noise = MEDIAN_ERROR / (held_out.matches() as f64).sqrt();
+    let mut best = None;
+    for kind in 0..deviations.len() {
+        let tried: Vec<(f64, Vec<Pose>, f64)> = (DEVIATIONS.par_iter())
+            .filter_map(|part| {
+                let mut bounded = deviations;
+                bounded[kind] *= part;
+                let adjusted = fitted.adjust(given, poses.to_vec(), bounded);
+                let error = held_out.median_error(&adjusted, 1)?;
+                Some((bounded[kind], adjusted, error))
+            })
+            .collect();
+        let least = (tried.iter().map(|t| t.2)).fold(f64::INFINITY, f64::min);
+        let tightest = tried.into_iter().find(|t| t.2 <= least * (1.0 + noise));
+        let (deviation, adjusted, error) = tightest?;
+        deviations[kind] = deviation;
+        best = Some((adjusted, error));
+    }
+    best
 }
