@@ -206,7 +206,9 @@ impl<'a> Painters<'a> {
                 seed: SEED,
                 frame: 0,
             };
-            tracer.add(&mut card, &view, samples).expect("the card works");
+            tracer
+                .add(&mut card, &view, samples)
+                .expect("the card works");
             std::hint::black_box(card.mean());
             card.rays as usize
         };
