@@ -190,7 +190,8 @@ fn clusters_hold_each_fitted_pixel_at_most_once_and_its_mean_colour() {
             .sum();
         let mean = (sum / c.pixels.len() as f64).as_vec3();
         assert!((c.measured - mean).length() <= 1e-6 * mean.length());
-        assert!(c.weight.is_finite() && c.weight.min_element() > 0.0);
+        let weight = c.weight(DVec3::ZERO);
+        assert!(weight.is_finite() && weight.min_element() > 0.0);
         for &pixel in &c.pixels {
             assert!(seen.insert((c.frame, pixel)), "{pixel} is fitted twice");
             assert!(!HoldOut::from(&Settings::default()).contains(c.frame, pixel));

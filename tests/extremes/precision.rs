@@ -125,7 +125,8 @@ fn fit_in_f64(
         for cached in &cache.clusters {
             let [(la, ja), (lb, jb)] = means(cached, &x, channel);
             let measured = f64::from(cached.cluster.measured[channel]);
-            let weight = f64::from(cached.cluster.weight[channel]);
+            let fitted = DVec3::splat((la + lb) * 0.5);
+            let weight = cached.cluster.weight(fitted)[channel];
             let (ra, rb) = (measured - la, measured - lb);
             objective += weight * ra * rb;
             for (i, &p) in free.iter().enumerate() {

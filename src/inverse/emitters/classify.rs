@@ -34,6 +34,7 @@ pub struct Change {
 
 /// A cluster's radiance due to its own object, from both sets of paths: `target` = albedo × `irradiance`, or emission × `coverage`.
 struct OwnRadiance {
+    /// At the photographed radiance, so that neither role is favoured by being the present one.
     weight: DVec3,
     /// Channels in which the target is a lower bound.
     censored: BVec3,
@@ -85,7 +86,8 @@ fn own_radiance(cache: &PathCache, unknowns: &Unknowns, roles: &[Role]) -> Vec<V
         })
         .collect();
     let mut own: Vec<Vec<OwnRadiance>> = (0..surfaces).map(|_| Vec::new()).collect();
-    for cluster in cache.linearise(unknowns, &row_of, &[]) {
+    let linearised = cache.linearise(unknowns, &row_of, &[]);
+    for (cached, cluster) in cache.clusters.iter().zip(linearised) {
         let k = cluster.object as usize;
         if !is_classified(k) {
             continue;
@@ -100,7 +102,7 @@ fn own_radiance(cache: &PathCache, unknowns: &Unknowns, roles: &[Role]) -> Vec<V
             unknowns.emission[k].as_dvec3(),
         );
         own[k].push(OwnRadiance {
-            weight: cluster.weight,
+            weight: cached.cluster.weight(cached.cluster.measured.as_dvec3()),
             censored: cluster.censored,
             target: std::array::from_fn(|set| {
                 cluster.residuals[set] + albedo * irradiance[set] + emission * coverage[set]
@@ -259,7 +261,8 @@ mod tests {
         };
         CachedCluster {
             cluster: Cluster {
-                weight: Vec3::splat(1.0 / (measured * measured + 0.25)),
+                predicted: Some(Vec3::splat(measured)),
+                dark: Vec3::splat(0.5),
                 ..Cluster::unit(object, 1, Vec3::splat(measured))
             },
             vertices: vec![path(0), path(1)],

@@ -243,7 +243,8 @@ mod tests {
         let measured: f32 = if lamp { 17.3 } else { 0.37 };
         CachedCluster {
             cluster: Cluster {
-                weight: Vec3::splat(measured.powi(-2)),
+                predicted: Some(Vec3::splat(measured)),
+                dark: Vec3::ZERO,
                 ..Cluster::unit(u32::from(lamp), 1, Vec3::splat(measured))
             },
             vertices: vec![vertex(0), vertex(1)],
@@ -278,7 +279,6 @@ mod tests {
             let mut cached = opposed(0);
             cached.cluster.object = lamp;
             cached.cluster.measured = Vec3::ONE;
-            cached.cluster.weight = Vec3::ONE;
             CachedCluster { vertices, ..cached }
         });
         let fitted = fitted(

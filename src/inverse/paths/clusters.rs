@@ -32,19 +32,28 @@ pub struct Cluster {
     pub measured: Vec3,
     /// Channels in which a pixel is saturated, so that `measured` is a lower bound.
     pub censored: BVec3,
-    /// Weight of the squared residual of the mean, per channel: pixels / (level² + dark²).
-    pub weight: Vec3,
+    /// Radiance that paths other than those of the fit predict; see [`Self::weight`].
+    pub predicted: Option<Vec3>,
     /// Level below which the weight stops growing.
     pub dark: Vec3,
 }
 
 impl Cluster {
-    /// Sets the weight from a level per channel.
+    /// Weight of the squared residual of the mean, per channel: pixels / (level² + dark²).
     ///
-    /// The photographed level would favour pixels that are dark by noise or texture, and bias the albedo of a textured object
-    /// below its mean. A level predicted from independent paths has no such bias.
-    pub fn weigh(&mut self, level: Vec3) {
-        self.weight = (level * level + self.dark * self.dark).recip() * self.pixels.len() as f32;
+    /// The photographed radiance as the level would favour pixels that are dark by noise or texture, and bias the albedo of a
+    /// textured object below its mean. Where mesh or pose are a pixel off, a dark pixel that the fit has in the sun would outweigh a
+    /// sunlit one that it has in shadow by (level / dark)². A level predicted from paths other than the fit's has neither fault.
+    /// Without one, the squares of photographed and `fitted` radiance are averaged, so that both mistakes weigh alike; the variance
+    /// then follows the mean as in a quasi-likelihood (Wedderburn 1974).
+    pub fn weight(&self, fitted: DVec3) -> DVec3 {
+        let square = |v: Vec3| (v * v).as_dvec3();
+        let fitted = fitted.max(DVec3::ZERO);
+        let level = match self.predicted {
+            Some(level) => square(level),
+            None => (square(self.measured) + fitted * fitted) * 0.5,
+        };
+        self.pixels.len() as f64 / (level + square(self.dark))
     }
 }
 
@@ -97,18 +106,16 @@ pub fn cluster(problem: &Problem, gbuffer: &GBuffer, max_pixels: usize) -> Vec<C
             let censored = (pixels.iter())
                 .map(|&p| saturated(frame, p))
                 .fold(BVec3::FALSE, |any, saturated| any | saturated);
-            let mut cluster = Cluster {
+            Cluster {
                 frame,
                 object,
                 pixels,
                 paths: 1,
                 measured,
                 censored,
-                weight: Vec3::ONE,
+                predicted: None,
                 dark,
-            };
-            cluster.weigh(measured);
-            cluster
+            }
         })
         .collect()
 }
@@ -196,7 +203,7 @@ pub fn brightness(clusters: &[Cluster], surfaces: usize) -> Vec<f32> {
 
 #[cfg(test)]
 impl Cluster {
-    /// A cluster for tests: unit weight, one path per pixel and set.
+    /// A cluster for tests: a weight of one a pixel, one path per pixel and set.
     pub fn unit(object: u32, pixels: u32, measured: Vec3) -> Self {
         Self {
             frame: 0,
@@ -205,7 +212,7 @@ impl Cluster {
             paths: 1,
             measured,
             censored: BVec3::FALSE,
-            weight: Vec3::ONE,
+            predicted: Some(Vec3::ZERO),
             dark: Vec3::ONE,
         }
     }
@@ -215,28 +222,37 @@ impl Cluster {
 mod tests {
     use super::*;
 
+    /// Weights at a fitted radiance of a dark and a bright cluster.
+    fn weights([dark, bright]: [f32; 2], predicted: Option<Vec3>, fitted: f64) -> [f64; 2] {
+        let weight = |measured: f32| {
+            let cluster = Cluster {
+                predicted,
+                dark: Vec3::splat(0.1),
+                ..Cluster::unit(0, 10, Vec3::splat(measured))
+            };
+            cluster.weight(DVec3::splat(fitted)).x
+        };
+        [weight(dark), weight(bright)]
+    }
+
     #[test]
     fn a_predicted_level_weighs_dark_and_bright_spots_of_a_texture_alike() {
-        let cluster = |measured: f32| Cluster {
-            dark: Vec3::splat(0.1),
-            ..Cluster::unit(0, 10, Vec3::splat(measured))
-        };
-        let mut spots = [cluster(0.2), cluster(1.8)];
-        let mean = |spots: &[Cluster]| {
-            let (sum, weight) = spots.iter().fold((0.0, 0.0), |(s, w), c| {
-                (s + c.weight.x * c.measured.x, w + c.weight.x)
-            });
-            sum / weight
-        };
-        for spot in &mut spots {
-            spot.weigh(spot.measured);
-        }
-        assert!(mean(&spots) < 0.3);
-        for spot in &mut spots {
-            spot.weigh(Vec3::ONE);
-        }
-        assert!((mean(&spots) - 1.0).abs() < 1e-6);
-        assert!((spots[0].weight.x - 10.0 / 1.01).abs() < 1e-4);
+        let spots = [0.2, 1.8];
+        let mean = |[dark, bright]: [f64; 2]| (0.2 * dark + 1.8 * bright) / (dark + bright);
+        let predicted = weights(spots, Some(Vec3::ONE), 1.0);
+        assert!((mean(predicted) - 1.0).abs() < 1e-6);
+        assert!((predicted[0] - 10.0 / 1.01).abs() < 1e-4);
+        // The photographed radiance alone would give 0.22.
+        let fitted = mean(weights(spots, None, 1.0));
+        assert!((0.5..0.55).contains(&fitted), "{fitted}");
+    }
+
+    #[test]
+    fn a_dark_pixel_taken_for_lit_weighs_as_a_lit_one_taken_for_dark() {
+        let [dark, bright] = [0.1, 5.0];
+        let [too_bright, _] = weights([dark, bright], None, f64::from(bright));
+        let [_, too_dark] = weights([dark, bright], None, f64::from(dark));
+        assert!((too_bright / too_dark - 1.0).abs() < 1e-6);
     }
 
     #[test]

@@ -93,7 +93,7 @@ impl PathCache {
         clusters.map(offset).collect()
     }
 
-    /// Each cluster's level for [`Cluster::weigh`](crate::inverse::paths::clusters::Cluster::weigh), predicted by its paths.
+    /// Each cluster's level for [`Cluster::weight`](crate::inverse::paths::clusters::Cluster::weight), predicted by its paths.
     pub fn levels(&self, unknowns: &Unknowns) -> Vec<Vec3> {
         let clusters = self.clusters.par_iter();
         clusters.map(|cached| level(cached, unknowns)).collect()
@@ -150,6 +150,7 @@ fn linearise(
         differentiate(vertices, unknowns, reflected, incident, &mut gradients[set])
     });
     let residuals = means.map(|mean| cached.cluster.measured.as_dvec3() - mean);
+    let fitted = (means[0] + means[1]) * 0.5;
 
     // The free parameters that either set touches.
     let [a, b] = &*gradients;
@@ -176,7 +177,7 @@ fn linearise(
     Linearised {
         own: Vec3::from((a.values[own] + b.values[own]) * (0.5 * scale)).as_dvec3(),
         object: cached.cluster.object,
-        weight: cached.cluster.weight.as_dvec3(),
+        weight: cached.cluster.weight(fitted),
         pixels: cached.cluster.pixels.len() as f64,
         residuals,
         censored: cached.cluster.censored,

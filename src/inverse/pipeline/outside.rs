@@ -7,9 +7,9 @@ use crate::inverse::fit::gauss_newton::{MIN_DAMPING, propose};
 use crate::inverse::fit::prior::Prior;
 use crate::inverse::fit::robust_weights::RobustWeights;
 use crate::inverse::outside::MeasuredOutside;
+use crate::inverse::paths::PathCache;
 use crate::inverse::paths::clusters::mean_radiance;
 use crate::inverse::paths::evaluate::Linearised;
-use crate::inverse::paths::{CachedCluster, PathCache};
 use crate::inverse::pipeline::{Pipeline, Result};
 use crate::inverse::roles::{self, Role};
 use crate::inverse::unknowns::Unknowns;
@@ -312,16 +312,13 @@ struct Misfit(Vec<(f64, f64)>);
 
 impl Misfit {
     fn new(cache: &PathCache, unknowns: &Unknowns) -> Self {
-        let clusters = cache.clusters.iter().zip(cache.residuals(unknowns));
-        let of = |(cached, found): (&CachedCluster, Linearised)| {
-            let cluster = &cached.cluster;
-            let level = cluster.measured * cluster.measured + cluster.dark * cluster.dark;
+        let of = |found: Linearised| {
             let [a, b] = found.residuals;
-            let square = DVec3::select(found.bound_met(), DVec3::ZERO, a * b / level.as_dvec3());
+            let square = found.weight_now() * a * b / found.pixels;
             let square = square.clamp(DVec3::NEG_ONE, DVec3::ONE).element_sum() / 3.0;
             (square, found.pixels)
         };
-        Self(clusters.map(of).collect())
+        Self(cache.residuals(unknowns).into_iter().map(of).collect())
     }
 
     fn mean(&self) -> f64 {
