@@ -129,7 +129,7 @@ fn moments(passes: &[Vec<DVec3>], parameter: usize, channel: usize) -> Moments {
 #[test]
 fn independent_samples_give_the_gradient_and_shared_samples_a_biased_one() {
     let (scene, unknowns, lit) = world();
-    let believed = vec![0.5; unknowns.surfaces()];
+    let expected = vec![0.5; unknowns.surfaces()];
     let tracer = Tracer {
         scene: &scene,
         lights: &lit.emitters,
@@ -138,7 +138,7 @@ fn independent_samples_give_the_gradient_and_shared_samples_a_biased_one() {
         sky: None,
         outside: None,
         surface_of: &scene.object_of,
-        expected_albedo: &believed,
+        expected_albedo: &expected,
         lobes: &[],
         patches: None,
         sampling: LightSampling::Mis,

@@ -38,7 +38,7 @@ fn room() -> Arc<Scene> {
     Arc::new(Scene::new(&capture).expect("the room is sound"))
 }
 
-/// Random values, some emissions zero: what was believed when the paths were traced is none of them.
+/// Random values, some emissions zero: the albedos expected when the paths were traced are none of them.
 fn unknowns(surfaces: usize, key: u64) -> Unknowns {
     let mut stream = Stream::new(31, 0, 0, key);
     let mut color = || Vec3::from_array(std::array::from_fn(|_| stream.uniform()));
@@ -107,7 +107,7 @@ fn rounds_with(
 ) -> Vec<PathCache> {
     let weights = [0.05, 0.05, 0.05, 0.05, 0.05, 0.05, 1.0, 0.05];
     let lights = Emitters::new(scene, &weights);
-    let believed = vec![0.6; scene.objects.len()];
+    let expected = vec![0.6; scene.objects.len()];
     let tracer = |round: u32| Tracer {
         scene,
         lights: &lights,
@@ -116,7 +116,7 @@ fn rounds_with(
         sky: None,
         outside: None,
         surface_of: &scene.object_of,
-        expected_albedo: &believed,
+        expected_albedo: &expected,
         lobes,
         patches,
         sampling,

@@ -154,7 +154,7 @@ fn a_checkpoint_of_another_solver_or_a_broken_one_is_refused() {
             "/descent/patches",
             serde_json::json!({"levels": [], "patch_of": [], "depth": []}),
         ),
-        ("/descent/believed", serde_json::json!([])),
+        ("/descent/expected_albedo", serde_json::json!([])),
     ] {
         let mut broken = checkpoint.clone();
         *broken.state.pointer_mut(path).expect("the field is there") = value;

@@ -12,7 +12,7 @@ use crate::inverse::unknowns::Unknowns;
 use glam::{DVec3, Vec3};
 
 /// The prior without terms for the albedos of lamps.
-pub fn beliefs(prior: &Prior, roles: &[Role]) -> Prior {
+pub fn without_lamps(prior: &Prior, roles: &[Role]) -> Prior {
     let mut prior = prior.clone();
     lamps(roles).for_each(|k| prior.forget_albedo(k));
     prior
@@ -124,7 +124,8 @@ mod tests {
         let free = roles::free(&roles, |_| true);
         let mut clusters = room(albedo, seen);
         hold_exitance(&mut clusters, &roles, &roles::places(&free, 3));
-        let mut found = descend(clusters, &about, &about, &free, &beliefs(&prior, &roles)).unknowns;
+        let prior = without_lamps(&prior, &roles);
+        let mut found = descend(clusters, &about, &about, &free, &prior).unknowns;
         leave_out(&mut found, &roles);
         (plain, found)
     }

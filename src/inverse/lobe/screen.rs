@@ -174,10 +174,10 @@ mod tests {
     #[test]
     fn noise_speaks_for_no_lobe_and_a_lobe_for_itself() {
         for seed in 0..40 {
-            let nothing = strength(&made(0.0, seed), 100).expect("enough sights");
+            let nothing = strength(&made(0.0, seed), 100).expect("enough observations");
             assert!(nothing.abs() < 4.0, "{nothing}");
         }
-        let lobe = strength(&made(1.5, 50), 100).expect("enough sights");
+        let lobe = strength(&made(1.5, 50), 100).expect("enough observations");
         assert!(lobe > 5.0, "{lobe}");
     }
 }

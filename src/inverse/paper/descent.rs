@@ -46,7 +46,7 @@ pub struct Descent {
     pub level: u32,
     /// The largest channel of each object's albedo at the start of the level, for Russian roulette. The present albedo would make
     /// zero a fixed point.
-    believed: Vec<f32>,
+    expected_albedo: Vec<f32>,
     adam: Adam,
     /// Of the steps of the present level, albedos first, then emissions.
     average: Average,
@@ -83,7 +83,7 @@ impl Descent {
             emission: vec![Vec3::ZERO; objects],
             patches: None,
             level: 0,
-            believed: vec![1.0; objects],
+            expected_albedo: vec![1.0; objects],
             adam: Adam::new(2 * objects),
             average: Average::new(vec![Vec3::ZERO; 2 * objects]),
             steps: 0,
@@ -110,7 +110,7 @@ impl Descent {
         let patches = self.patches.as_ref();
         self.emission.len() == objects
             && self.albedo.len() == objects + patches.map_or(0, Patches::len)
-            && self.believed.len() == objects
+            && self.expected_albedo.len() == objects
             && self.adam.parameters() == Some(self.albedo.len() + objects)
             && self.average.parameters() == self.adam.parameters()
             && patches.is_none_or(|patches| patches.fit(triangles))
@@ -162,7 +162,7 @@ impl Descent {
         self.average.restart();
         if self.patches.is_none() && self.level >= ROULETTE_FROM {
             let expected = |albedo: &Vec3| albedo.max_element().max(MIN_EXPECTED_ALBEDO);
-            self.believed = self.albedo.iter().map(expected).collect();
+            self.expected_albedo = self.albedo.iter().map(expected).collect();
         }
     }
 
@@ -320,7 +320,7 @@ impl Descent {
                 lights: emitters,
                 measured: None,
                 surface_of: &scene.object_of,
-                expected_albedo: &self.believed,
+                expected_albedo: &self.expected_albedo,
                 texels: patches.map(|patches| (&patches.layout, None)),
                 lobes: &self.lobes,
                 patches: None,

@@ -41,7 +41,7 @@ pub struct Best {
     emission: Vec<Vec3>,
     train: Option<f64>,
     held_out: Option<f64>,
-    /// [`Best::judged`] at the start of the stage.
+    /// [`Best::compared`] at the start of the stage.
     at_first: Option<f64>,
 }
 
@@ -51,7 +51,7 @@ impl Best {
     }
 
     /// The loss that states are compared by: on held-out pixels, or in the fit if no pixel is held out.
-    fn judged(&self) -> Option<f64> {
+    fn compared(&self) -> Option<f64> {
         self.held_out.or(self.train)
     }
 }
@@ -148,16 +148,16 @@ impl Run<'_, '_> {
         let loss = self.losses.measure(self.problem, &self.estimate);
         self.monitor.cast(loss.cast);
         self.monitor.loss(loss.train, loss.held_out);
-        let judged = loss.held_out.or(loss.train);
+        let compared = loss.held_out.or(loss.train);
         let best = self.state.best.as_ref();
-        if best.is_none_or(|best| is_below(judged, best.judged())) {
+        if best.is_none_or(|best| is_below(compared, best.compared())) {
             let (albedo, emission) = self.state.descent.averaged();
             self.state.best = Some(Best {
                 albedo: albedo.to_vec(),
                 emission: emission.to_vec(),
                 train: loss.train,
                 held_out: loss.held_out,
-                at_first: best.map_or(judged, |best| best.at_first),
+                at_first: best.map_or(compared, |best| best.at_first),
             });
         }
         loss.train
@@ -169,12 +169,12 @@ impl Run<'_, '_> {
         let Some(best) = self.state.best.take() else {
             return;
         };
-        let kept = is_below(best.judged(), best.at_first) || self.state.descent.patches.is_none();
+        let kept = is_below(best.compared(), best.at_first) || self.state.descent.patches.is_none();
         let words = |loss: Option<f64>| loss.map_or("-".to_owned(), |loss| format!("{loss:.4}"));
         let course = format!(
             "loss from {} to {} on {}",
             words(best.at_first),
-            words(best.judged()),
+            words(best.compared()),
             match best.held_out {
                 Some(_) => "held-out pixels",
                 None => "pixels in the fit",

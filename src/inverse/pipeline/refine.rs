@@ -190,7 +190,7 @@ impl Pipeline<'_, '_> {
     /// errors and model error.
     pub(super) fn descend(&mut self, clusters: Vec<Linearised>, about: &Unknowns) -> Descended {
         let free = roles::free(&self.roles, |k| self.has_free_albedo(k));
-        let prior = lamp_albedo::beliefs(&self.prior, &self.roles);
+        let prior = lamp_albedo::without_lamps(&self.prior, &self.roles);
         let found = descend(clusters, about, &self.unknowns, &free, &prior);
         let equations = jackknifed(
             found.equations.clone(),

@@ -87,16 +87,16 @@ impl Pipeline<'_, '_> {
             max_bounces: self.max_bounces,
         };
         let (losses, problem) = (&self.losses, self.problem);
-        let judged = Cell::new(RayCount::default());
-        let judge = |estimate: &Estimate| {
+        let rays = Cell::new(RayCount::default());
+        let loss = |estimate: &Estimate| {
             let (loss, cast) = losses.held_out(problem, estimate);
-            let mut all = judged.get();
+            let mut all = rays.get();
             all += cast;
-            judged.set(all);
+            rays.set(all);
             loss
         };
         let (monitor, estimate, checkpoint) = (&mut self.monitor, &self.estimate, &self.checkpoint);
-        let (refined, ended) = refine(&task, estimate, &objects, &judge, &mut |step, fraction| {
+        let (refined, ended) = refine(&task, estimate, &objects, &loss, &mut |step, fraction| {
             monitor.cast(step.cast);
             if let Some(residual) = step.residual {
                 monitor.texture(residual);
@@ -104,7 +104,7 @@ impl Pipeline<'_, '_> {
             monitor.progress.fraction = Some(fraction as f32);
             monitor.tick(estimate, &|_| checkpoint.clone())
         });
-        self.monitor.cast(judged.get());
+        self.monitor.cast(rays.get());
         let mut why = refined.summary(|k| self.problem.scene.objects[k].name.clone());
         if ended.is_err() {
             why.push_str("; the stage ended early");

@@ -190,13 +190,13 @@ impl Step {
 pub type Report<'t> = dyn FnMut(Step, f64) -> Result<(), Termination> + 't;
 
 /// Tries a texture on each of the given objects, keeps those that improve held-out pixels, and then alternates between light and
-/// textures. `judge` is the loss of an estimate on held-out pixels: a sweep that makes it worse is undone. If `report` ends the
-/// stage, the result of the sweeps so far is returned with its error.
+/// textures. A sweep that raises `held_out_loss`, an estimate's loss on held-out pixels, is undone. If `report` ends the stage, the
+/// result of the sweeps so far is returned with its error.
 pub fn refine(
     task: &Task,
     estimate: &Estimate,
     objects: &[usize],
-    judge: &dyn Fn(&Estimate) -> Option<f64>,
+    held_out_loss: &dyn Fn(&Estimate) -> Option<f64>,
     report: &mut Report,
 ) -> (Refined, Result<(), Termination>) {
     let mut refinement = Refinement {
@@ -219,7 +219,7 @@ pub fn refine(
             states.push(refinement.refined());
         }
     }
-    (latest_good(states, estimate, judge), ended)
+    (latest_good(states, estimate, held_out_loss), ended)
 }
 
 /// The latest state whose held-out loss is at most [`MAX_LOSS_RATIO`] times the least, over all states and the estimate without
@@ -227,7 +227,7 @@ pub fn refine(
 fn latest_good(
     mut states: Vec<Refined>,
     estimate: &Estimate,
-    judge: &dyn Fn(&Estimate) -> Option<f64>,
+    held_out_loss: &dyn Fn(&Estimate) -> Option<f64>,
 ) -> Refined {
     if states.iter().all(|state| state.texels.is_none()) {
         return states.pop().unwrap_or_default();
@@ -235,10 +235,10 @@ fn latest_good(
     let loss = |state: &Refined| {
         let mut textured = estimate.clone();
         state.apply(&mut textured);
-        judge(&textured)
+        held_out_loss(&textured)
     };
     let losses: Vec<Option<f64>> = states.iter().map(loss).collect();
-    let flat = judge(estimate);
+    let flat = held_out_loss(estimate);
     let best = (losses.iter().chain([&flat]).flatten()).fold(f64::INFINITY, |a, b| a.min(*b));
     let good = |loss: &Option<f64>| loss.is_none_or(|loss| loss <= best * MAX_LOSS_RATIO);
     match losses.iter().rposition(good) {

@@ -42,10 +42,10 @@ pub fn noise(
 ) -> Noise {
     let scene = &*problem.scene;
     let lights = lamps(scene, &unknowns.emission);
-    let believed = vec![1.0; unknowns.surfaces()];
+    let expected = vec![1.0; unknowns.surfaces()];
     let tracer = Tracer {
         lobes,
-        ..tracer(scene, &lights, &believed, sampling, BOUNCES)
+        ..tracer(scene, &lights, &expected, sampling, BOUNCES)
     };
     let all = pixels_of(problem);
     let count = pixels.min(all.len());
@@ -205,8 +205,8 @@ fn variances<U: Uniforms>(
 ) -> Vec<f64> {
     let scene = &*problem.scene;
     let lights = lamps(scene, &truth.emission);
-    let believed: Vec<f32> = truth.albedo.iter().map(|a| a.max_element()).collect();
-    let tracer = tracer(scene, &lights, &believed, LightSampling::Mis, MAX_BOUNCES);
+    let expected: Vec<f32> = truth.albedo.iter().map(|a| a.max_element()).collect();
+    let tracer = tracer(scene, &lights, &expected, LightSampling::Mis, MAX_BOUNCES);
     let camera = &scene.cameras[frame];
     let (mut vertices, mut gathered) = (Vec::new(), Vec::new());
     let mut gradient = Gradient::new(2 * truth.surfaces());

@@ -33,8 +33,8 @@ impl Paths {
         let mut weights = vec![0.0; surfaces];
         lamps.iter().for_each(|&lamp| weights[lamp] = 1.0);
         let lights = Emitters::new(scene, &weights);
-        let believed = vec![ALBEDO; surfaces];
-        let tracer = tracer(scene, &lights, &believed, LightSampling::Mis, BOUNCES);
+        let expected = vec![ALBEDO; surfaces];
+        let tracer = tracer(scene, &lights, &expected, LightSampling::Mis, BOUNCES);
         let (mut vertices, mut path_ends) = (Vec::new(), Vec::new());
         for path in 0..count {
             let frame = path % scene.cameras.len().max(1);

@@ -106,14 +106,14 @@ fn run(bench: &Bench) -> Result<Findings> {
         let name = format!("paper, {stage}");
         states.push(measure.state(&name, &subject.problem, progress, estimate));
     }
-    let judged = match measure.truth {
+    let compared = match measure.truth {
         Some(_) => {
             "albedo pictures of all photographs against the true ones (peak 1, lamps left out), and held-out loss"
         }
         None => "held-out loss, as no truth is known",
     };
     let how = format!(
-        "{}: {judged}, rendered with all bounces. The transport cache is run without lobes and without the test for \
+        "{}: {compared}, rendered with all bounces. The transport cache is run without lobes and without the test for \
          photographs that disagree, and with exposures and light from outside on captures alone. The paper's descent is preset \
          `paper` with {BOUNCES} bounces (the paper's two cut off light that these photographs hold), from zero, one stage after \
          the other: {}. It {}. Seconds are those of this machine and whatever else ran on it.",
