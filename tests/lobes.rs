@@ -91,7 +91,7 @@ fn lobes_are_found_where_they_are_and_nowhere_else() {
 }
 
 #[test]
-fn no_highlight_becomes_a_texture_or_speaks_against_a_photograph() {
+fn no_highlight_becomes_a_texture_or_an_outlier_photograph() {
     let (_, solution, _) = &*ROUGH_ROOM;
     assert!(solution.estimate.texels.is_none());
     let looked = |name: &str| solution.progress.stages.iter().any(|s| s.name == name);

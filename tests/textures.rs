@@ -327,7 +327,7 @@ fn who_ends_it_is_obeyed() {
 
 /// Light and texture may fail to agree: what held-out pixels say decides between the states.
 #[test]
-fn states_that_held_out_pixels_speak_against_are_not_kept() {
+fn states_that_raise_the_held_out_loss_are_not_kept() {
     let gbuffer = gbuffer(&ROOM.problem);
     let task = task(&ROOM.problem, &gbuffer, 10_000);
     let judged = |judge: &dyn Fn(&Estimate) -> Option<f64>| {

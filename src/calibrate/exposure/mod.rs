@@ -368,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lens_that_brightens_its_corners_is_not_believed() {
+    fn a_lens_that_brightens_its_corners_is_refused() {
         let observations = dimmed(&[DVec3::ZERO; 4], DVec3::splat(-2.0));
         let found = estimate(&observations, 4, Common::Lens);
         assert_eq!(found.vignetting, None);

@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cluster_far_out_pulls_and_costs_trust_within_bounds() {
+    fn the_influence_of_an_outlier_is_bounded() {
         let quiet: Vec<Linearised> = clusters(0, noise(400, 0.1))
             .chain(clusters(1, noise(40, 0.1)))
             .collect();
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_albedo_costs_no_trust() {
+    fn a_wrong_albedo_does_not_lower_the_weight() {
         let even = |object| clusters(object, (0..100).map(|i| 0.05 * (i % 5) as f64 - 0.1));
         let right: Vec<Linearised> = even(0).chain(even(1)).collect();
         let mut wrong = right.clone();
@@ -206,7 +206,7 @@ mod tests {
 
     /// 2 % of the clusters are 100 deviations brighter; their effect on the object's albedo stays small.
     #[test]
-    fn clusters_far_out_do_not_move_the_bound_that_holds_them() {
+    fn outliers_do_not_raise_their_own_bound() {
         let mut all: Vec<Linearised> = clusters(0, noise(400, 0.1)).collect();
         for cluster in &mut all {
             cluster.own = DVec3::ONE;
@@ -225,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn silence_is_trusted_within_bounds_and_none_at_all_leaves_weights_even() {
+    fn objects_without_residuals_have_bounded_weights() {
         let all: Vec<Linearised> = clusters(0, noise(100, 0.1))
             .chain(clusters(1, noise(1_000_000, 0.0).take(90)))
             .collect();

@@ -172,7 +172,7 @@ mod tests {
 
     /// Of 40 standard scores, one exceeds 4 with a probability of 1/400.
     #[test]
-    fn noise_speaks_for_no_lobe_and_a_lobe_for_itself() {
+    fn a_lobe_is_told_from_noise() {
         for seed in 0..40 {
             let nothing = strength(&made(0.0, seed), 100).expect("enough observations");
             assert!(nothing.abs() < 4.0, "{nothing}");

@@ -247,7 +247,7 @@ mod tests {
 
     /// Green is saturated: a darker model has a residual there, a brighter one has none.
     #[test]
-    fn a_lower_bound_is_silent_where_the_model_exceeds_it() {
+    fn a_lower_bound_has_no_residual_where_the_model_exceeds_it() {
         let mut bound = cached();
         bound.cluster.censored = BVec3::new(false, true, false);
         let mut linearise = |measured: f32| {

@@ -165,7 +165,7 @@ impl Pipeline<'_, '_> {
 /// Marks white walls and lamps of equal radiance as not identifiable. Between white surfaces all radiance approaches that of the
 /// lamp, as in a furnace, so a reflector with an albedo of about one and the radiance of a lamp may be the lamp instead.
 /// `brightness` is the mean of each object's brightest channel over its pixels.
-pub fn doubt_white(estimate: &mut Estimate, brightness: &[f32]) {
+pub fn flag_white(estimate: &mut Estimate, brightness: &[f32]) {
     let objects = &mut estimate.objects;
     let lamps: Vec<usize> = (0..objects.len())
         .filter(|&k| objects[k].emission.max_element() > 0.0 && objects[k].seen_pixels > 0)
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn a_white_wall_as_bright_as_the_lamp_is_doubted_with_it_and_a_grey_or_darker_one_is_not() {
+    fn a_white_wall_as_bright_as_the_lamp_is_flagged_with_it_and_a_grey_or_darker_one_is_not() {
         let object = |albedo: f32, emission: f32| ObjectEstimate {
             albedo: Vec3::splat(albedo),
             emission: Vec3::splat(emission),
@@ -228,7 +228,7 @@ mod tests {
                 objects: vec![object(0.0, 2.0), object(albedo, 0.0), object(0.5, 0.0)],
                 ..Default::default()
             };
-            doubt_white(&mut estimate, &[2.0, brightness, 1.0]);
+            flag_white(&mut estimate, &[2.0, brightness, 1.0]);
             assert!(estimate.objects[2].identifiable);
             [0, 1].map(|k| estimate.objects[k].identifiable)
         };

@@ -30,7 +30,7 @@ impl Pipeline<'_, '_> {
             let refined = detail.scaled_to(&self.unknowns.albedo, object_of);
             refined.apply(&mut self.estimate);
         }
-        describe::doubt_white(&mut self.estimate, &self.brightness);
+        describe::flag_white(&mut self.estimate, &self.brightness);
         self.describe_known();
     }
 

@@ -25,7 +25,7 @@ const NONLINEAR: f32 = 0.3;
 const WELL_KNOWN: f32 = 0.3;
 /// Least number of rounds that show how noisy their own sum is.
 const TELLING_ROUNDS: u32 = 4;
-/// Increase of the held-out loss, in standard errors, above which the refinement is doubted: a chance of 3·10⁻⁵.
+/// Increase of the held-out loss, in standard errors, above which a warning is given: a chance of 3·10⁻⁵.
 const WORSE: f64 = 4.0;
 /// Paths of a round over the paths that predict the levels of clusters.
 const PREDICTING: u64 = 4;
@@ -75,13 +75,13 @@ impl Pipeline<'_, '_> {
         let textures = self.monitor.settings.textures;
         if textures && self.aim().1.median < ENOUGH_FOR_TEXTURES {
             self.add_rounds(&mut rounds, Leg::UntilTextures)?;
-            self.doubt_refinement(&before);
+            self.warn_if_worse(&before);
             self.detail()?;
             self.refit(&mut rounds)?;
         }
         let ended = self.add_rounds(&mut rounds, Leg::UntilDone)?;
         if self.detail.is_none() {
-            self.doubt_refinement(&before);
+            self.warn_if_worse(&before);
             if textures {
                 self.detail()?;
             }
@@ -93,7 +93,7 @@ impl Pipeline<'_, '_> {
     }
 
     /// Warns if held-out pixels became clearly worse: the fit then explains its pixels by light or colours that are not there.
-    fn doubt_refinement(&mut self, before: &[f64]) {
+    fn warn_if_worse(&mut self, before: &[f64]) {
         let after = self.held_out_each();
         let increase = increase(before, &after);
         if increase > WORSE {
