@@ -88,7 +88,7 @@ fn rows() -> Vec<Cluster> {
         paths: 2,
         measured: Vec3::ZERO,
         censored: BVec3::FALSE,
-        predicted: Some(Vec3::ZERO),
+        level: Some(Vec3::ZERO),
         dark: Vec3::ONE,
     };
     (0..height).map(row).collect()
@@ -335,7 +335,7 @@ fn paths_that_end_in_photographed_radiance_hold_one_bounce_and_that_radiance() {
         paths: 4,
         measured: Vec3::ZERO,
         censored: BVec3::FALSE,
-        predicted: Some(Vec3::ZERO),
+        level: Some(Vec3::ZERO),
         dark: Vec3::ONE,
     }];
     let cache = tracer.trace(&clusters);

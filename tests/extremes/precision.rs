@@ -125,12 +125,13 @@ fn fit_in_f64(
         for cached in &cache.clusters {
             let [(la, ja), (lb, jb)] = means(cached, &x, channel);
             let measured = f64::from(cached.cluster.measured[channel]);
-            let fitted = DVec3::splat((la + lb) * 0.5);
-            let weight = cached.cluster.weight(fitted)[channel];
+            let weight_at = |fitted| cached.cluster.weight(DVec3::splat(fitted))[channel];
+            let weight = weight_at((la + lb) * 0.5);
+            let [wa, wb] = [la, lb].map(weight_at);
             let (ra, rb) = (measured - la, measured - lb);
             objective += weight * ra * rb;
             for (i, &p) in free.iter().enumerate() {
-                descent[i] += 0.5 * weight * (ja[p] * rb + jb[p] * ra);
+                descent[i] += 0.5 * (wa * ja[p] * rb + wb * jb[p] * ra);
                 for (j, &q) in free.iter().enumerate() {
                     hessian[(i, j)] += 0.25 * weight * (ja[p] + jb[p]) * (ja[q] + jb[q]);
                 }

@@ -261,7 +261,7 @@ mod tests {
         };
         CachedCluster {
             cluster: Cluster {
-                predicted: Some(Vec3::splat(measured)),
+                level: Some(Vec3::splat(measured)),
                 dark: Vec3::splat(0.5),
                 ..Cluster::unit(object, 1, Vec3::splat(measured))
             },

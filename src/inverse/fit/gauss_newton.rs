@@ -243,7 +243,7 @@ mod tests {
         let measured: f32 = if lamp { 17.3 } else { 0.37 };
         CachedCluster {
             cluster: Cluster {
-                predicted: Some(Vec3::splat(measured)),
+                level: Some(Vec3::splat(measured)),
                 dark: Vec3::ZERO,
                 ..Cluster::unit(u32::from(lamp), 1, Vec3::splat(measured))
             },

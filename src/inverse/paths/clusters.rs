@@ -32,8 +32,8 @@ pub struct Cluster {
     pub measured: Vec3,
     /// Channels in which a pixel is saturated, so that `measured` is a lower bound.
     pub censored: BVec3,
-    /// Radiance that paths other than those of the fit predict; see [`Self::weight`].
-    pub predicted: Option<Vec3>,
+    /// Level that [`Self::weight`] is taken at; `None` for photographed and fitted radiance alike.
+    pub level: Option<Vec3>,
     /// Level below which the weight stops growing.
     pub dark: Vec3,
 }
@@ -41,19 +41,20 @@ pub struct Cluster {
 impl Cluster {
     /// Weight of the squared residual of the mean, per channel: pixels / (level² + dark²).
     ///
-    /// The photographed radiance as the level would favour pixels that are dark by noise or texture, and bias the albedo of a
-    /// textured object below its mean. Where mesh or pose are a pixel off, a dark pixel that the fit has in the sun would outweigh a
-    /// sunlit one that it has in shadow by (level / dark)². A level predicted from paths other than the fit's has neither fault.
-    /// Without one, the squares of photographed and `fitted` radiance are averaged, so that both mistakes weigh alike; the variance
-    /// then follows the mean as in a quasi-likelihood (Wedderburn 1974).
+    /// The photographed radiance as the level favours pixels that are dark by noise or texture, and biases the albedo of a textured
+    /// object below its mean; a level predicted by paths other than the fit's does not. Where mesh or pose are a pixel off, as in a
+    /// scan, a dark pixel that the fit has in the sun would outweigh a sunlit one that it has in shadow by (level / dark)². The mean
+    /// of the squares of photographed and `fitted` radiance weighs both mistakes alike, and the variance follows the mean as in a
+    /// quasi-likelihood (Wedderburn 1974).
     pub fn weight(&self, fitted: DVec3) -> DVec3 {
-        let square = |v: Vec3| (v * v).as_dvec3();
-        let fitted = fitted.max(DVec3::ZERO);
-        let level = match self.predicted {
-            Some(level) => square(level),
-            None => (square(self.measured) + fitted * fitted) * 0.5,
+        let square = match self.level {
+            Some(level) => level * level,
+            None => {
+                let fitted = fitted.max(DVec3::ZERO).as_vec3();
+                (self.measured * self.measured + fitted * fitted) * 0.5
+            }
         };
-        self.pixels.len() as f64 / (level + square(self.dark))
+        ((square + self.dark * self.dark).recip() * self.pixels.len() as f32).as_dvec3()
     }
 }
 
@@ -113,7 +114,7 @@ pub fn cluster(problem: &Problem, gbuffer: &GBuffer, max_pixels: usize) -> Vec<C
                 paths: 1,
                 measured,
                 censored,
-                predicted: None,
+                level: (!problem.scene.scanned).then_some(measured),
                 dark,
             }
         })
@@ -212,7 +213,7 @@ impl Cluster {
             paths: 1,
             measured,
             censored: BVec3::FALSE,
-            predicted: Some(Vec3::ZERO),
+            level: Some(Vec3::ZERO),
             dark: Vec3::ONE,
         }
     }
@@ -223,10 +224,10 @@ mod tests {
     use super::*;
 
     /// Weights at a fitted radiance of a dark and a bright cluster.
-    fn weights([dark, bright]: [f32; 2], predicted: Option<Vec3>, fitted: f64) -> [f64; 2] {
+    fn weights([dark, bright]: [f32; 2], level: Option<Vec3>, fitted: f64) -> [f64; 2] {
         let weight = |measured: f32| {
             let cluster = Cluster {
-                predicted,
+                level,
                 dark: Vec3::splat(0.1),
                 ..Cluster::unit(0, 10, Vec3::splat(measured))
             };

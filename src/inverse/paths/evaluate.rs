@@ -13,6 +13,8 @@ pub struct Linearised {
     pub object: u32,
     /// Weight of the squared residual, per channel.
     pub weight: DVec3,
+    /// Weights at the radiance of set A and of set B alone, over `weight`.
+    pub of_sets: [DVec3; 2],
     /// Number of pixels, which is the weight of a squared relative residual.
     pub pixels: f64,
     /// Photograph minus model, from set A and from set B.
@@ -50,10 +52,12 @@ impl Linearised {
         DVec3::select(self.bound_met(), DVec3::ZERO, self.weight)
     }
 
-    /// Each row's term of the unbiased right-hand side, for a weight per channel: ½ w (J_A r_B + J_B r_A).
+    /// Each row's term of the unbiased right-hand side, for a weight per channel: ½ w (J_A r_B + J_B r_A). Each residual is weighed
+    /// at the radiance of the other set, whose noise is not its own.
     pub fn scores(&self, weight: DVec3) -> impl Iterator<Item = DVec3> + '_ {
         let [ra, rb] = self.residuals;
-        (self.rows.iter()).map(move |&(_, ja, jb)| weight * (ja * rb + jb * ra) * 0.5)
+        let [wa, wb] = self.of_sets;
+        (self.rows.iter()).map(move |&(_, ja, jb)| weight * (ja * rb * wa + jb * ra * wb) * 0.5)
     }
 }
 
@@ -150,7 +154,7 @@ fn linearise(
         differentiate(vertices, unknowns, reflected, incident, &mut gradients[set])
     });
     let residuals = means.map(|mean| cached.cluster.measured.as_dvec3() - mean);
-    let fitted = (means[0] + means[1]) * 0.5;
+    let weight = cached.cluster.weight((means[0] + means[1]) * 0.5);
 
     // The free parameters that either set touches.
     let [a, b] = &*gradients;
@@ -177,7 +181,8 @@ fn linearise(
     Linearised {
         own: Vec3::from((a.values[own] + b.values[own]) * (0.5 * scale)).as_dvec3(),
         object: cached.cluster.object,
-        weight: cached.cluster.weight(fitted),
+        weight,
+        of_sets: means.map(|mean| cached.cluster.weight(mean) / weight),
         pixels: cached.cluster.pixels.len() as f64,
         residuals,
         censored: cached.cluster.censored,
@@ -195,6 +200,7 @@ impl Linearised {
         Self {
             object,
             weight: DVec3::ONE,
+            of_sets: [DVec3::ONE; 2],
             pixels: 1.0,
             residuals: [residual; 2],
             censored: BVec3::FALSE,

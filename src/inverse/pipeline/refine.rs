@@ -277,7 +277,7 @@ impl Pipeline<'_, '_> {
         }
         let levels = self.traced(lights, None, 3, 0, |slice| slice.levels(&unknowns))?;
         for (cluster, level) in self.clusters.iter_mut().zip(levels) {
-            cluster.predicted = Some(level);
+            cluster.level = Some(level);
         }
         Ok(())
     }
