@@ -330,20 +330,20 @@ fn who_ends_it_is_obeyed() {
 fn states_that_raise_the_held_out_loss_are_not_kept() {
     let gbuffer = gbuffer(&ROOM.problem);
     let task = task(&ROOM.problem, &gbuffer, 10_000);
-    let judged = |judge: &dyn Fn(&Estimate) -> Option<f64>| {
-        let (refined, ended) = refine(&task, &ROOM.estimate, &[BACK], judge, &mut |_, _| Ok(()));
+    let refined = |loss: &dyn Fn(&Estimate) -> Option<f64>| {
+        let (state, ended) = refine(&task, &ROOM.estimate, &[BACK], loss, &mut |_, _| Ok(()));
         ended.expect("nobody ends it");
-        refined
+        state
     };
     let texture = |e: &Estimate| e.texels.as_ref().map(|t| t.colors.colors.len());
     // Worse than one colour: none is kept.
-    let refused = judged(&|e| Some(if texture(e).is_some() { 2.0 } else { 1.0 }));
+    let refused = refined(&|e| Some(if texture(e).is_some() { 2.0 } else { 1.0 }));
     assert!(refused.texels.is_none() && refused.worse);
     assert!(refused.attempts.iter().all(|a| !a.kept));
     // The last state is worse than the first, which has fewer texels: the first is kept.
-    let last = judged(&|_| None);
+    let last = refined(&|_| None);
     let most = last.texels.as_ref().map(|t| t.colors.colors.len());
-    let first = judged(&|e| Some(if texture(e) == most { 2.0 } else { 1.0 }));
+    let first = refined(&|e| Some(if texture(e) == most { 2.0 } else { 1.0 }));
     let cells = |r: &relit::inverse::texture::Refined| r.attempts[0].cells;
     assert!(first.texels.is_some() && cells(&first) < cells(&last));
 }

@@ -59,13 +59,15 @@ pub fn refine(frames: &mut [ImportedFrame], chosen: &[usize]) -> Result<Option<S
         .collect();
 
     let mut poses = given.clone();
+    let mut widest = [0.0; 2];
     let mut seen: Vec<Vec<Match>> = Vec::new();
     for round in 0..ROUNDS {
         seen = matches::look_up(&points, &pictures, &poses, round == 0);
         let fitted = Adjustment::new(&points, &seen, &lenses, |point| point % HELD_OUT != 0);
-        let Some(widest) = fitted.deviations(&given) else {
+        let Some(deviations) = fitted.deviations(&given) else {
             return Ok(None);
         };
+        widest = deviations;
         poses = fitted.adjust(&given, poses, widest);
     }
 
@@ -78,7 +80,7 @@ pub fn refine(frames: &mut [ImportedFrame], chosen: &[usize]) -> Result<Option<S
     if before < SMALL_ERROR {
         return Ok(None);
     }
-    let Some((poses, after)) = nearest(&fitted, &held_out, &given, &poses) else {
+    let Some((poses, after)) = nearest(&fitted, &held_out, &given, &poses, widest) else {
         return Ok(None);
     };
     if after > MIN_GAIN * before {
@@ -99,14 +101,14 @@ pub fn refine(frames: &mut [ImportedFrame], chosen: &[usize]) -> Result<Option<S
 }
 
 /// The poses nearest to the given ones that fit held-out points as well as any, within one standard error (Breiman et al. 1984), and
-/// the median error of these points in pixels. Shifts are bounded first, then turns.
+/// the median error of these points in pixels. Shifts are bounded first, then turns, each below its largest deviation.
 fn nearest(
     fitted: &Adjustment,
     held_out: &Adjustment,
     given: &[Pose],
     poses: &[Pose],
+    mut deviations: [f64; 2],
 ) -> Option<(Vec<Pose>, f64)> {
-    let mut deviations = fitted.deviations(given)?;
     let noise = MEDIAN_ERROR / (held_out.matches() as f64).sqrt();
     let mut best = None;
     for kind in 0..deviations.len() {

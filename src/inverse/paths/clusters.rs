@@ -50,7 +50,7 @@ impl Cluster {
         let square = match self.level {
             Some(level) => level * level,
             None => {
-                let fitted = fitted.max(DVec3::ZERO).as_vec3();
+                let fitted = fitted.as_vec3();
                 (self.measured * self.measured + fitted * fitted) * 0.5
             }
         };
@@ -223,37 +223,33 @@ impl Cluster {
 mod tests {
     use super::*;
 
-    /// Weights at a fitted radiance of a dark and a bright cluster.
-    fn weights([dark, bright]: [f32; 2], level: Option<Vec3>, fitted: f64) -> [f64; 2] {
-        let weight = |measured: f32| {
-            let cluster = Cluster {
-                level,
-                dark: Vec3::splat(0.1),
-                ..Cluster::unit(0, 10, Vec3::splat(measured))
-            };
-            cluster.weight(DVec3::splat(fitted)).x
+    /// Weight of a cluster of ten pixels.
+    fn weight(measured: f32, level: Option<f32>, fitted: f32) -> f64 {
+        let cluster = Cluster {
+            level: level.map(Vec3::splat),
+            dark: Vec3::splat(0.1),
+            ..Cluster::unit(0, 10, Vec3::splat(measured))
         };
-        [weight(dark), weight(bright)]
+        cluster.weight(DVec3::splat(f64::from(fitted))).x
     }
 
     #[test]
     fn a_predicted_level_weighs_dark_and_bright_spots_of_a_texture_alike() {
-        let spots = [0.2, 1.8];
-        let mean = |[dark, bright]: [f64; 2]| (0.2 * dark + 1.8 * bright) / (dark + bright);
-        let predicted = weights(spots, Some(Vec3::ONE), 1.0);
-        assert!((mean(predicted) - 1.0).abs() < 1e-6);
-        assert!((predicted[0] - 10.0 / 1.01).abs() < 1e-4);
-        // The photographed radiance alone would give 0.22.
-        let fitted = mean(weights(spots, None, 1.0));
-        assert!((0.5..0.55).contains(&fitted), "{fitted}");
+        let mean = |level: &dyn Fn(f32) -> Option<f32>| {
+            let [dark, bright] = [0.2, 1.8].map(|measured| weight(measured, level(measured), 1.0));
+            (0.2 * dark + 1.8 * bright) / (dark + bright)
+        };
+        assert!(mean(&Some) < 0.3);
+        let both = mean(&|_| None);
+        assert!((0.5..0.55).contains(&both), "{both}");
+        assert!((mean(&|_| Some(1.0)) - 1.0).abs() < 1e-6);
+        assert!((weight(0.2, Some(1.0), 1.0) - 10.0 / 1.01).abs() < 1e-4);
     }
 
     #[test]
     fn a_dark_pixel_taken_for_lit_weighs_as_a_lit_one_taken_for_dark() {
-        let [dark, bright] = [0.1, 5.0];
-        let [too_bright, _] = weights([dark, bright], None, f64::from(bright));
-        let [_, too_dark] = weights([dark, bright], None, f64::from(dark));
-        assert!((too_bright / too_dark - 1.0).abs() < 1e-6);
+        let ratio = weight(0.1, None, 5.0) / weight(5.0, None, 0.1);
+        assert!((ratio - 1.0).abs() < 1e-6, "{ratio}");
     }
 
     #[test]

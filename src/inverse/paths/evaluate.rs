@@ -268,6 +268,29 @@ mod tests {
         assert_eq!(brighter.weight_now(), DVec3::new(1.0, 0.0, 1.0));
     }
 
+    /// Set A sees the light 1, set B the light 3, both by an albedo of a half.
+    #[test]
+    fn each_residual_is_weighed_at_the_radiance_of_the_other_set() {
+        let path = |light: f32| Vertex {
+            known: Vec3::splat(light),
+            ..Vertex::on(0)
+        };
+        let cache = PathCache::from(vec![CachedCluster {
+            cluster: Cluster {
+                level: None,
+                ..Cluster::unit(0, 1, Vec3::ONE)
+            },
+            vertices: vec![path(1.0), path(3.0)],
+            ends: vec![1, 2],
+        }]);
+        let unknowns = Unknowns::grey([0.5], [0.0]);
+        let line = cache.linearise(&unknowns, &[0, usize::MAX], &[]).remove(0);
+        let score = line.scores(line.weight).next().expect("one row").x;
+        let weight = |radiance: f64| 1.0 / ((1.0 + radiance * radiance) * 0.5 + 1.0);
+        let expected = (weight(0.5) * 1.0 * (1.0 - 1.5) + weight(1.5) * 3.0 * (1.0 - 0.5)) * 0.5;
+        assert!((score - expected).abs() < 1e-6, "{score} for {expected}");
+    }
+
     #[test]
     fn the_edge_of_a_lamp_is_as_uncertain_as_its_contrast() {
         let mut edge = cached();
