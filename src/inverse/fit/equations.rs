@@ -18,6 +18,9 @@ use rayon::prelude::*;
 /// --preset preview` takes 3.1 s a room in the median, and 4.0 s with a limit of 256. More was not tried.
 const MAX_DENSE: usize = 1024;
 
+/// Blocks of lines of a matrix that each thread sums. Work is known only roughly, and the rows are read once per block.
+const BLOCKS_A_THREAD: usize = 4;
+
 /// Sums over the clusters of the fit at one value of the unknowns. Vectors have one entry per free parameter.
 #[derive(Debug, Clone)]
 pub struct NormalEquations {
@@ -31,6 +34,8 @@ pub struct NormalEquations {
     pub scatter: Vec<DVec3>,
     /// Σ w r_A r_B, an unbiased estimate of the squared error.
     pub objective: DVec3,
+    /// Σ w r̄² with r̄ = (r_A + r_B)/2, which unlike `objective` holds the noise of the paths.
+    pub squares: DVec3,
     /// Number of clusters with a residual in any channel.
     pub clusters: usize,
     /// Number of pixels in those clusters.
@@ -107,6 +112,7 @@ impl NormalEquations {
             across: vec![DVec3::ZERO; n],
             scatter: vec![DVec3::ZERO; n],
             objective: DVec3::ZERO,
+            squares: DVec3::ZERO,
             clusters: active().count(),
             pixels: active().map(|c| c.pixels).sum(),
             prior: prior.clone(),
@@ -114,7 +120,9 @@ impl NormalEquations {
         };
         for cluster in linearised {
             let weight = robust.weight(cluster);
+            let residual = cluster.residual();
             sums.objective += weight * cluster.residuals[0] * cluster.residuals[1];
+            sums.squares += weight * residual * residual;
             for (&(i, a, b), score) in cluster.rows.iter().zip(cluster.scores(weight)) {
                 let mean = (a + b) * 0.5;
                 sums.descent[i] += score;
@@ -168,27 +176,42 @@ impl Matrices {
 
 /// Per channel: the lower triangle of Σ v vᵀ over sparse rows v of `n` parameters.
 fn gram(rows: &[SparseRow], n: usize) -> [DMatrix<f64>; 3] {
-    // For each parameter, the rows with an entry of it and the index of that entry.
-    let mut entries_of: Vec<Vec<(u32, u32)>> = vec![Vec::new(); n];
-    for (row, entries) in rows.iter().enumerate() {
+    // Blocks of lines with equal work. Each goes through the rows in their order, so that no sum depends on their number.
+    let mut work = vec![0; n];
+    for entries in rows {
         for (index, (parameter, _)) in entries.iter().enumerate() {
-            entries_of[*parameter].push((row as u32, index as u32));
+            work[*parameter] += index + 1;
         }
     }
-    // Each line of the triangle is summed in the order of the rows.
-    let lines: Vec<Vec<DVec3>> = (entries_of.par_iter().enumerate())
-        .map(|(i, own)| {
-            let mut line = vec![DVec3::ZERO; i + 1];
-            for &(row, index) in own {
-                let up_to_own = &rows[row as usize][..=index as usize];
-                let factor = up_to_own[index as usize].1;
-                for &(parameter, value) in up_to_own {
-                    line[parameter] += factor * value;
+    let most = work.iter().sum::<usize>() / (BLOCKS_A_THREAD * rayon::current_num_threads()) + 1;
+    let (mut starts, mut done) = (vec![0], 0);
+    for (parameter, work) in work.iter().enumerate() {
+        done += work;
+        if done >= most * starts.len() {
+            starts.push(parameter + 1);
+        }
+    }
+    starts.push(n);
+    let lines: Vec<Vec<Vec<DVec3>>> = (starts.par_windows(2))
+        .map(|ends| {
+            let block = ends[0]..ends[1];
+            let mut lines: Vec<_> = block.clone().map(|i| vec![DVec3::ZERO; i + 1]).collect();
+            for row in rows {
+                let start = row.partition_point(|entry| entry.0 < block.start);
+                for (index, (i, factor)) in row.iter().enumerate().skip(start) {
+                    if *i >= block.end {
+                        break;
+                    }
+                    let line = &mut lines[i - block.start];
+                    for (j, value) in &row[..=index] {
+                        line[*j] += *factor * *value;
+                    }
                 }
             }
-            line
+            lines
         })
         .collect();
+    let lines: Vec<&Vec<DVec3>> = lines.iter().flatten().collect();
     std::array::from_fn(|channel| {
         DMatrix::from_fn(n, n, |i, j| lines[i].get(j).map_or(0.0, |v| v[channel]))
     })
