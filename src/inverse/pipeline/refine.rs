@@ -23,10 +23,7 @@ use glam::Vec3;
 const NONLINEAR: f32 = 0.3;
 /// Relative standard error below which an emission counts as well determined.
 const WELL_KNOWN: f32 = 0.3;
-/// Paths of a round over those of a round that only finds where to linearise: a point that is off by twice a round's noise serves
-/// as well, since only the square of the remaining step is left out.
-const APPROACHING: u64 = 4;
-/// Number of rounds that show how noisy their own sum is. After fewer, it must be smaller in proportion.
+/// Least number of rounds that show how noisy their own sum is.
 const TELLING_ROUNDS: u32 = 4;
 /// Increase of the held-out loss, in standard errors, above which a warning is given: a chance of 3·10⁻⁵.
 const WORSE: f64 = 4.0;
@@ -47,8 +44,6 @@ pub(super) struct Rounds {
     places: Vec<usize>,
     /// The unknowns that the sums are linearised about.
     pub about: Unknowns,
-    /// Whether the point to linearise about is still searched for, with fewer paths a round and without sums.
-    approaching: bool,
     sums: Accumulated,
     next: u32,
     /// Whether rounds were added since the last refit.
@@ -116,14 +111,13 @@ impl Pipeline<'_, '_> {
         let lights = self.lights();
         self.patches = LampPatches::new(&self.problem.scene, &self.roles);
         self.weigh_by_prediction(&lights)?;
-        self.distribute(self.budget.round_paths / APPROACHING);
+        self.distribute(self.budget.round_paths);
         // Including the albedos of lamps.
         let free = roles::free(&self.roles, |k| self.has_free_albedo(k));
         Ok(Rounds {
             lights,
             places: roles::places(&free, self.roles.len()),
             about: self.unknowns.clone(),
-            approaching: true,
             sums: Accumulated::default(),
             next: 0,
             has_new: false,
@@ -141,7 +135,7 @@ impl Pipeline<'_, '_> {
         loop {
             // The target may change while a solve runs.
             let (most, aim) = self.aim_of(leg);
-            if rounds.next >= most && rounds.sums.rounds() > 0 {
+            if rounds.next >= most {
                 break;
             }
             let round = rounds.next;
@@ -159,26 +153,15 @@ impl Pipeline<'_, '_> {
             let found = self.descend(clusters, &rounds.about);
             self.robust = found.robust;
             self.path_noise = path_noise::fractions(&found.clusters, self.roles.len());
+            // The effect of textures is relative to the present linearisation, which then must stay.
+            let may_restart = self.detail.is_none() && round < most.min(self.budget.rounds) / 4;
+            let far = may_restart && is_nonlinear(&rounds.about, &self.unknowns, &self.errors);
             self.describe();
             self.monitor
                 .report(&self.estimate, &|_| self.checkpoint.clone())?;
-            // The effect of textures is relative to the present linearisation, which then must stay.
-            let quarter = most.min(self.budget.rounds) / 4;
-            let restarts = if rounds.approaching {
-                quarter
-            } else {
-                2 * quarter
-            };
-            let far = self.detail.is_none()
-                && rounds.next < restarts
-                && is_nonlinear(&rounds.about, &self.unknowns, &self.errors);
-            if rounds.approaching || far {
+            if far {
                 rounds.about = self.unknowns.clone();
                 rounds.sums = Accumulated::default();
-                if rounds.approaching && !far {
-                    rounds.approaching = false;
-                    self.distribute(self.budget.round_paths);
-                }
                 continue;
             }
             let reported = self.reported();
@@ -332,12 +315,12 @@ struct Reported {
 }
 
 impl Reported {
-    /// Whether more paths would gain little: the error is below its target, or the part due to path noise is negligible.
+    /// Whether more paths would gain little after some rounds: the error is below its target, or the part due to path noise is
+    /// negligible.
     fn is_enough(&self, aim: Aim, rounds: u32) -> bool {
         let targets = [aim.median, aim.tail];
-        let told = f64::from(rounds.min(TELLING_ROUNDS)) / f64::from(TELLING_ROUNDS);
-        let negligible = |i: usize| self.of_paths[i] < self.all[i] * aim.path_noise * told;
-        (0..2).all(|i| self.all[i] < targets[i] || negligible(i))
+        let negligible = |i: usize| self.of_paths[i] < self.all[i] * aim.path_noise;
+        (0..2).all(|i| self.all[i] < targets[i] || rounds >= TELLING_ROUNDS && negligible(i))
     }
 }
 

@@ -37,8 +37,6 @@ pub struct TexturedSurface {
     /// Whether it has a lobe.
     glossy: bool,
     seed: u64,
-    /// Width of its cells, relative to the footprints of its pixels.
-    width: f32,
     pixels: Vec<SeenPixel>,
     /// Its cells.
     pub cells: Cells,
@@ -81,13 +79,10 @@ impl TexturedSurface {
         Self::cut(&task.problem.scene, object, glossy, pixels, seed, width)
     }
 
-    /// The same object in cells of another width. The strength of smoothing goes with it: an edge then costs the same as before.
+    /// The same object in cells of another width.
     pub fn recut(&self, scene: &Scene, width: f32) -> Option<Self> {
         let pixels = self.pixels.clone();
-        let mut cut = Self::cut(scene, self.object, self.glossy, pixels, self.seed, width)?;
-        let strength = self.texture.strength;
-        cut.texture.strength = strength.map(|strength| strength * width / self.width);
-        Some(cut)
+        Self::cut(scene, self.object, self.glossy, pixels, self.seed, width)
     }
 
     fn cut(
@@ -109,7 +104,6 @@ impl TexturedSurface {
             object,
             glossy,
             seed,
-            width,
             seen: vec![0; cells.count()],
             seen_area: Vec::new(),
             texture: Texture {
