@@ -32,10 +32,12 @@ pub struct Fit {
     pub iterations: u64,
 }
 
-/// Weighted variance of one cluster's residual, by which the prior is weighed. It holds the noise of the paths: without it the
-/// variance may come out negative where paths are noisy, and the prior would vanish just where it is needed.
+/// Weighted variance of one cluster's residual, by which the prior is weighed: without path noise, or with it in channels where
+/// that noise makes the estimate negative. The prior would else vanish just where paths are noisy.
 pub fn noise(equations: &NormalEquations) -> DVec3 {
-    (equations.squares / equations.clusters.max(1) as f64).max(DVec3::splat(1e-12))
+    let measured = equations.objective.cmpgt(DVec3::ZERO);
+    let variance = DVec3::select(measured, equations.objective, equations.squares);
+    (variance / equations.clusters.max(1) as f64).max(DVec3::splat(1e-12))
 }
 
 /// Fits the free parameters (indices into albedos, then emissions). `between` receives the equations after
