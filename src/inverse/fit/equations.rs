@@ -34,8 +34,6 @@ pub struct NormalEquations {
     pub scatter: Vec<DVec3>,
     /// Σ w r_A r_B, an unbiased estimate of the squared error.
     pub objective: DVec3,
-    /// Σ w r̄² with r̄ = (r_A + r_B)/2, which unlike `objective` holds the noise of the paths.
-    pub squares: DVec3,
     /// Number of clusters with a residual in any channel.
     pub clusters: usize,
     /// Number of pixels in those clusters.
@@ -112,7 +110,6 @@ impl NormalEquations {
             across: vec![DVec3::ZERO; n],
             scatter: vec![DVec3::ZERO; n],
             objective: DVec3::ZERO,
-            squares: DVec3::ZERO,
             clusters: active().count(),
             pixels: active().map(|c| c.pixels).sum(),
             prior: prior.clone(),
@@ -120,9 +117,7 @@ impl NormalEquations {
         };
         for cluster in linearised {
             let weight = robust.weight(cluster);
-            let residual = cluster.residual();
             sums.objective += weight * cluster.residuals[0] * cluster.residuals[1];
-            sums.squares += weight * residual * residual;
             for (&(i, a, b), score) in cluster.rows.iter().zip(cluster.scores(weight)) {
                 let mean = (a + b) * 0.5;
                 sums.descent[i] += score;

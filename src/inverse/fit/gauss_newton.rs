@@ -32,12 +32,9 @@ pub struct Fit {
     pub iterations: u64,
 }
 
-/// Weighted variance of one cluster's residual, by which the prior is weighed: without path noise, or with it in channels where
-/// that noise makes the estimate negative. The prior would else vanish just where paths are noisy.
+/// Weighted variance of one cluster's residual, without path noise.
 pub fn noise(equations: &NormalEquations) -> DVec3 {
-    let measured = equations.objective.cmpgt(DVec3::ZERO);
-    let variance = DVec3::select(measured, equations.objective, equations.squares);
-    (variance / equations.clusters.max(1) as f64).max(DVec3::splat(1e-12))
+    (equations.objective / equations.clusters.max(1) as f64).max(DVec3::splat(1e-12))
 }
 
 /// Fits the free parameters (indices into albedos, then emissions). `between` receives the equations after
@@ -229,7 +226,6 @@ fn dense_step(
 mod tests {
     use super::*;
     use crate::inverse::paths::clusters::Cluster;
-    use crate::inverse::paths::evaluate::Linearised;
     use crate::inverse::paths::{CachedCluster, Vertex};
     use crate::inverse::roles::{self, Role};
     use crate::math::rng::Stream;
@@ -308,25 +304,5 @@ mod tests {
         let [albedo, emission] = [fitted.unknowns.albedo[0].x, fitted.unknowns.emission[1].x];
         assert!((albedo / 0.37 - 1.0).abs() < 2e-3, "{albedo}");
         assert!((emission / 17.3 - 1.0).abs() < 2e-3, "{emission}");
-    }
-
-    /// The residuals of the two sets have opposite signs, so that their product says nothing of the noise.
-    #[test]
-    fn noisy_paths_do_not_switch_the_prior_off() {
-        let residuals = [DVec3::ONE, DVec3::splat(-0.2)];
-        let noisy = Linearised {
-            rows: vec![(0, DVec3::ONE, DVec3::ONE)],
-            residuals,
-            ..Linearised::unit(0, DVec3::ZERO)
-        };
-        let mut prior = Prior::new(1, 1, Vec3::ONE);
-        prior.albedo.deviation[0] = Vec3::splat(0.01);
-        let equations = NormalEquations::new(&[noisy], 1, &RobustWeights::even(1), &prior);
-        assert!(equations.objective.max_element() < 0.0);
-        let start = Unknowns::grey([0.5], [0.0]);
-        let (next, _) = propose(&equations, &[0], &start, MIN_DAMPING);
-        // One residual of 0.4 and a prior of 0.01: the precisions' mean is 40² times nearer to the prior.
-        let expected = 0.5 + 0.4 / (1.0 + 40.0 * 40.0);
-        assert!((next.albedo[0] - expected).abs().max_element() < 1e-6);
     }
 }
