@@ -28,8 +28,16 @@ fn depth_size(folder: &Folder, name: &str) -> Result<[u32; 2]> {
 }
 
 /// The lens of fx, fy, cx, cy in OpenCV's convention, with pixel centres at integers; captures have them at half-integers.
+///
+/// A principal point of exactly half the size was not calibrated: who writes it means the middle of the picture, which is half a
+/// pixel from there in OpenCV's convention.
 fn opencv_lens(size: [u32; 2], [fx, fy, cx, cy]: [f64; 4]) -> Lens {
-    Lens::plain(size, [fx, fy], [cx + 0.5, cy + 0.5])
+    let middle = size.map(|side| f64::from(side) * 0.5);
+    let principal = match [cx, cy] == middle {
+        true => middle,
+        false => [cx + 0.5, cy + 0.5],
+    };
+    Lens::plain(size, [fx, fy], principal)
 }
 
 /// The lens of a file with OpenCV's matrix of intrinsics.
@@ -112,5 +120,21 @@ impl Frames {
             ));
         }
         self.scan
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_the_size_is_the_middle_and_calibrated_points_are_at_pixel_centres() {
+        let principal = |cx, cy| {
+            let pinhole = opencv_lens([640, 480], [525.0, 525.0, cx, cy]).pinhole;
+            [pinhole.cx, pinhole.cy]
+        };
+        assert_eq!(principal(320.0, 240.0), [320.0, 240.0]);
+        assert_eq!(principal(319.5, 239.5), [320.0, 240.0]);
+        assert_eq!(principal(320.0, 241.0), [320.5, 241.5]);
     }
 }
