@@ -222,11 +222,11 @@ fn a_saturated_sky_is_a_bound_only_where_nothing_measured_it() {
     assert_eq!(bound, Some(Vec3::ONE));
 }
 
-/// The room with its window in photographs that show the sky as white, and its materials.
-fn overexposed() -> (Problem, Vec<Material>) {
+/// The room with its window in photographs that show the sky as white, and its materials. `noise` seeds the photographs.
+fn overexposed(noise: u64) -> (Problem, Vec<Material>) {
     let (mesh, materials) = room_with_a_window();
     let capture = scenes::capture(mesh, &views(), SIZE);
-    let mut problem = scenes::photographed_under(Some(sky()), &capture, &materials, 512, 74);
+    let mut problem = scenes::photographed_under(Some(sky()), &capture, &materials, 512, noise);
     for photograph in &mut problem.photographs {
         scenes::clip(Arc::make_mut(photograph), CLIPPED);
     }
@@ -236,12 +236,18 @@ fn overexposed() -> (Problem, Vec<Material>) {
 /// The sky is brighter than the photographs can show: by how much is found by what it does to the walls.
 #[test]
 fn a_sky_that_all_photographs_show_as_white_is_found_by_its_light() {
-    let (problem, materials) = overexposed();
-    let estimate = run(&problem).estimate;
-    let errors = relative_errors(&estimate, &materials);
-    // 0.032 and 0.077 are seen.
-    assert!(errors[errors.len() / 2] < 0.05, "{errors:?}");
-    assert!(errors[errors.len() - 1] < 0.1, "{errors:?}");
+    // One photograph's noise decides much: the mean over several tells.
+    const NOISES: u64 = 4;
+    let found = (74..74 + NOISES).map(|noise| {
+        let (problem, materials) = overexposed(noise);
+        let errors = relative_errors(&run(&problem).estimate, &materials);
+        [errors[errors.len() / 2], errors[errors.len() - 1]]
+    });
+    let [median, worst] = found.fold([0.0; 2], |sum, errors| {
+        [0, 1].map(|i| sum[i] + errors[i] / NOISES as f32)
+    });
+    // 0.020 and 0.040 are seen; one photograph's alone are up to 0.031 and 0.065.
+    assert!(median < 0.03 && worst < 0.06, "{median} {worst}");
 }
 
 /// Keeps every checkpoint.
@@ -261,7 +267,7 @@ impl Observer for Keeper {
 /// What the light field found of the sky is in its checkpoint: a solve that is taken up there ends as if it had gone on.
 #[test]
 fn a_solve_goes_on_with_what_it_found_of_an_overexposed_sky() {
-    let (problem, _) = overexposed();
+    let (problem, _) = overexposed(74);
     let settings = Settings {
         textures: false,
         lobes: false,

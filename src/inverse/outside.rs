@@ -144,23 +144,37 @@ impl MeasuredOutside {
     }
 
     /// Expected radiance of an unmeasured direction: the mean over measured directions within ± `band` / 2 radians of its
-    /// elevation, or over all measured directions.
-    pub fn expected(&self, direction: Vec3, band: f64) -> Vec3 {
+    /// elevation, or over all measured directions. And whether most of these are lower bounds, which say nothing of its colour.
+    pub fn expected(&self, direction: Vec3, band: f64) -> (Vec3, bool) {
         let elevation_of = |d: Vec3| f64::from(d.dot(self.up).clamp(-1.0, 1.0)).asin();
         let elevation = elevation_of(direction);
         let [width, height] = self.map.size();
-        let (mut near, mut all) = ((DVec3::ZERO, 0.0), (DVec3::ZERO, 0.0));
-        for (cell, radiance) in self.cells_with(|half| &half.known) {
-            let seen = direction_of(width, height, cell);
-            let solid_angle = f64::from(1.0 - seen.y * seen.y).max(0.0).sqrt();
-            let radiance = radiance.as_dvec3() * solid_angle;
-            all = (all.0 + radiance, all.1 + solid_angle);
-            if (elevation_of(seen) - elevation).abs() < 0.5 * band {
-                near = (near.0 + radiance, near.1 + solid_angle);
+        // Sums of radiance, of solid angles, and of those with lower bounds.
+        let (mut near, mut all) = ([(DVec3::ZERO, 0.0, 0.0); 2]).into();
+        for censored in [false, true] {
+            let flags: fn(&Half) -> &[bool] = match censored {
+                true => |half| &half.censored,
+                false => |half| &half.known,
+            };
+            for (cell, radiance) in self.cells_with(flags) {
+                let seen = direction_of(width, height, cell);
+                let solid_angle = f64::from(1.0 - seen.y * seen.y).max(0.0).sqrt();
+                let term = match censored {
+                    true => (DVec3::ZERO, 0.0, solid_angle),
+                    false => (radiance.as_dvec3() * solid_angle, solid_angle, 0.0),
+                };
+                let add = |sum: &mut (DVec3, f64, f64)| {
+                    *sum = (sum.0 + term.0, sum.1 + term.1, sum.2 + term.2);
+                };
+                add(&mut all);
+                if (elevation_of(seen) - elevation).abs() < 0.5 * band {
+                    add(&mut near);
+                }
             }
         }
-        let (sum, weight) = if near.1 > 0.0 { near } else { all };
-        (sum / f64::max(weight, f64::MIN_POSITIVE)).as_vec3()
+        let (sum, weight, bounds) = if near.1 > 0.0 { near } else { all };
+        let mean = (sum / f64::max(weight, f64::MIN_POSITIVE)).as_vec3();
+        (mean, 2.0 * bounds > weight)
     }
 
     /// Mean of the lower bounds; black if there are none.
@@ -260,7 +274,7 @@ mod tests {
         };
         let at = |row: usize| {
             let direction = direction_of(width, height, row * 16 + 12);
-            measured.expected(direction, PI / 8.0)
+            measured.expected(direction, PI / 8.0).0
         };
         assert!((at(2) - Vec3::splat(4.0)).length() < 1e-5);
         assert!((at(5) - Vec3::ONE).length() < 1e-5);
@@ -271,7 +285,7 @@ mod tests {
             up: direction_of(width, height, above),
             ..measured
         };
-        let off = sideways.expected(sideways.up, PI / 8.0) - Vec3::splat(4.0);
+        let off = sideways.expected(sideways.up, PI / 8.0).0 - Vec3::splat(4.0);
         assert!(off.length() < 1e-5, "{off}");
     }
 

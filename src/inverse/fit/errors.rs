@@ -1,7 +1,7 @@
 //! Standard errors of fitted parameters, and score tests of parameters held fixed.
 
 use crate::inverse::fit::equations::{Coupling, Matrices, NormalEquations, per_channel};
-use crate::inverse::fit::gauss_newton::noise;
+use crate::inverse::fit::gauss_newton::prior_variance;
 use crate::inverse::fit::prior::ALBEDO_DEVIATION;
 use crate::inverse::fit::robust_weights::RobustWeights;
 use crate::inverse::fit::rows::Rows;
@@ -87,7 +87,7 @@ pub fn standard_errors(
         let own = variance.max(DVec3::ZERO).powf(0.5);
         let of_prior = DVec3::select(
             prior.precision[row].cmpgt(DVec3::ZERO),
-            (prior.variance / prior.precision[row]).powf(0.5),
+            (prior.variance[row] / prior.precision[row]).powf(0.5),
             DVec3::INFINITY,
         );
         let error = (own * inflation).min(of_prior).max(own).as_vec3();
@@ -153,15 +153,17 @@ struct PriorTerms {
     precision: Vec<DVec3>,
     /// Terms added to the diagonal: the precision, and one for parameters that no path meets.
     added: Vec<DVec3>,
-    /// Noise variance of one cluster.
-    variance: DVec3,
+    /// [`prior_variance`] of each parameter.
+    variance: Vec<DVec3>,
 }
 
 impl PriorTerms {
     fn new(equations: &NormalEquations, free: &[usize]) -> Self {
-        let variance = noise(equations);
-        let precision: Vec<DVec3> = (free.iter())
-            .map(|&i| equations.prior.of(i, variance).1)
+        let variance: Vec<DVec3> = (0..free.len())
+            .map(|row| prior_variance(equations, row))
+            .collect();
+        let precision: Vec<DVec3> = (free.iter().zip(&variance))
+            .map(|(&i, &variance)| equations.prior.of(i, variance).1)
             .collect();
         let added = (precision.iter().zip(&equations.diagonal))
             .map(|(p, d)| *p + DVec3::select(d.cmpgt(DVec3::ZERO), DVec3::ZERO, DVec3::ONE))
@@ -206,7 +208,7 @@ fn sandwich(matrices: &Matrices, prior: &PriorTerms) -> Vec<DVec3> {
         };
         let scatter = &scatter[channel];
         let meat = DMatrix::from_fn(n, n, |a, b| {
-            let own = prior.variance[channel] * prior.precision[a][channel];
+            let own = (prior.variance[a] * prior.precision[a])[channel];
             scatter[(a.max(b), a.min(b))] + if a == b { own } else { 0.0 }
         });
         // The diagonal of the product of all three; both matrices are symmetric.
@@ -231,7 +233,7 @@ fn bootstrap(rows: &Rows, prior: &PriorTerms) -> Vec<DVec3> {
             };
             let mut right = rows.scores_times(|cluster| sign(0, cluster));
             for (i, b) in right.iter_mut().enumerate() {
-                *b += (prior.variance * prior.precision[i]).powf(0.5) * sign(1, i);
+                *b += (prior.variance[i] * prior.precision[i]).powf(0.5) * sign(1, i);
             }
             rows.solve(&prior.added, &free, &right, &zero, DRAW_TOLERANCE)
         })

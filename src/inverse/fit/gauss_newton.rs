@@ -32,9 +32,16 @@ pub struct Fit {
     pub iterations: u64,
 }
 
-/// Weighted variance of one cluster's residual, without path noise.
-pub fn noise(equations: &NormalEquations) -> DVec3 {
-    (equations.objective / equations.clusters.max(1) as f64).max(DVec3::splat(1e-12))
+/// Variance of a cluster's residual by which the prior of the free parameter in `row` is weighed: the scatter of its scores over
+/// its curvature, the ratio that makes the mean squared error of a shrunken estimate least. Both contain the noise of its
+/// derivatives, so that parameters that few paths meet stay nearer to their prior. At least the mean over all clusters without path
+/// noise, since a parameter that one cluster determines has no scatter.
+pub fn prior_variance(equations: &NormalEquations, row: usize) -> DVec3 {
+    let mean = equations.objective / equations.clusters.max(1) as f64;
+    let diagonal = equations.diagonal[row];
+    let own = equations.scatter[row] / signal(diagonal, equations.across[row]);
+    let own = DVec3::select(diagonal.cmpgt(DVec3::ZERO), own, DVec3::ZERO);
+    mean.max(own).max(DVec3::splat(1e-12))
 }
 
 /// Fits the free parameters (indices into albedos, then emissions). `between` receives the equations after
@@ -121,12 +128,11 @@ pub fn relative_gradient(equations: &NormalEquations, free: &[usize], at: &Unkno
 
 /// The direction of descent of each free parameter, including the prior.
 fn gradients(equations: &NormalEquations, free: &[usize], at: &Unknowns) -> Vec<DVec3> {
-    let variance = noise(equations);
-    let with_prior = |(descent, &i): (&DVec3, &usize)| {
-        let (mean, precision) = equations.prior.of(i, variance);
-        *descent + precision * (mean - at.value(i).as_dvec3())
+    let with_prior = |(row, &i): (usize, &usize)| {
+        let (mean, precision) = equations.prior.of(i, prior_variance(equations, row));
+        equations.descent[row] + precision * (mean - at.value(i).as_dvec3())
     };
-    equations.descent.iter().zip(free).map(with_prior).collect()
+    free.iter().enumerate().map(with_prior).collect()
 }
 
 /// The upper bound of a parameter: 1 for albedos.
@@ -156,14 +162,14 @@ pub fn propose(
     damping: f64,
 ) -> (Unknowns, StepLength) {
     let x: Vec<DVec3> = free.iter().map(|&i| from.value(i).as_dvec3()).collect();
-    let variance = noise(equations);
     let descent = gradients(equations, free, from);
     // Parameters that no path meets keep their value.
     let added = |damping: f64| -> Vec<DVec3> {
-        (free.iter().zip(&equations.diagonal))
-            .map(|(&i, diagonal)| {
+        (free.iter().zip(&equations.diagonal).enumerate())
+            .map(|(row, (&i, diagonal))| {
                 let unmet = DVec3::select(diagonal.cmpgt(DVec3::ZERO), DVec3::ZERO, DVec3::ONE);
-                *diagonal * damping + equations.prior.of(i, variance).1 + unmet
+                let precision = equations.prior.of(i, prior_variance(equations, row)).1;
+                *diagonal * damping + precision + unmet
             })
             .collect()
     };
@@ -226,6 +232,7 @@ fn dense_step(
 mod tests {
     use super::*;
     use crate::inverse::paths::clusters::Cluster;
+    use crate::inverse::paths::evaluate::Linearised;
     use crate::inverse::paths::{CachedCluster, Vertex};
     use crate::inverse::roles::{self, Role};
     use crate::math::rng::Stream;
@@ -304,5 +311,25 @@ mod tests {
         let [albedo, emission] = [fitted.unknowns.albedo[0].x, fitted.unknowns.emission[1].x];
         assert!((albedo / 0.37 - 1.0).abs() < 2e-3, "{albedo}");
         assert!((emission / 17.3 - 1.0).abs() < 2e-3, "{emission}");
+    }
+
+    /// The residuals of the two sets have opposite signs, so that their product says nothing of the noise.
+    #[test]
+    fn noisy_paths_do_not_switch_the_prior_off() {
+        let residuals = [DVec3::ONE, DVec3::splat(-0.2)];
+        let noisy = Linearised {
+            rows: vec![(0, DVec3::ONE, DVec3::ONE)],
+            residuals,
+            ..Linearised::unit(0, DVec3::ZERO)
+        };
+        let mut prior = Prior::new(1, 1, Vec3::ONE);
+        prior.albedo.deviation[0] = Vec3::splat(0.01);
+        let equations = NormalEquations::new(&[noisy], 1, &RobustWeights::even(1), &prior);
+        assert!(equations.objective.max_element() < 0.0);
+        let start = Unknowns::grey([0.5], [0.0]);
+        let (next, _) = propose(&equations, &[0], &start, MIN_DAMPING);
+        // One residual of 0.4 and a prior of 0.01: the precisions' mean is 40² times nearer to the prior.
+        let expected = 0.5 + 0.4 / (1.0 + 40.0 * 40.0);
+        assert!((next.albedo[0] - expected).abs().max_element() < 1e-6);
     }
 }

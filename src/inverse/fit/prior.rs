@@ -21,7 +21,9 @@ const SUN_DEVIATION: f32 = 1e3;
 
 /// Standard deviation of each channel of outside radiance about its expected colour, relative to its fitted brightness. Of 0.03,
 /// 0.1 and 0.3 it gives the least albedo error in `relit trade --rooms 12 --family window --preset preview`.
-const OUTSIDE_TINT: f32 = 0.1;
+pub const OUTSIDE_TINT: f32 = 0.1;
+/// The same where nothing shows the colour: each channel may be off by as much as the whole.
+pub const UNKNOWN_TINT: f32 = 1.0;
 
 /// Relative standard deviation of a known value: small enough that nothing moves it.
 const KNOWN: f64 = 1e-12;
@@ -129,26 +131,26 @@ impl Prior {
     ///
     /// The effect of a direction on the room may determine little more than its brightness, and channels fitted independently
     /// would give colours from noise. `found` gives the fitted radiance and its standard error by surface; `color` gives the
-    /// expected colour, from the surface and its previous mean, or `None` for a surface whose prior stays.
+    /// expected colour and its relative deviation, from the surface and its previous mean, or `None` for a surface whose prior stays.
     pub fn with_outside_found(
         mut self,
         found: impl Fn(usize) -> (Vec3, Vec3),
-        color: impl Fn(u32, Vec3) -> Option<Vec3>,
+        color: impl Fn(u32, Vec3) -> Option<(Vec3, f32)>,
     ) -> Self {
         let surfaces = (self.outside..).zip(&mut self.directions);
         let mut expected: Vec<_> = surfaces
             .filter_map(|(surface, direction)| {
-                let color = color(surface as u32, direction.0)?;
+                let (color, tint) = color(surface as u32, direction.0)?;
                 let (radiance, error) = found(surface);
                 direction.0 = color * brightness(color, radiance, error);
-                Some(direction)
+                Some((direction, tint))
             })
             .collect();
         // A direction that was fitted black may still be as bright as a part of what shines elsewhere.
-        let sum: Vec3 = expected.iter().map(|(mean, _)| *mean).sum();
+        let sum: Vec3 = expected.iter().map(|(direction, _)| direction.0).sum();
         let least = self.photographed.max(sum / expected.len().max(1) as f32);
-        for (mean, deviation) in &mut expected {
-            *deviation = mean.max(least) * OUTSIDE_TINT;
+        for ((mean, deviation), tint) in &mut expected {
+            *deviation = mean.max(least) * *tint;
         }
         self
     }
@@ -219,27 +221,36 @@ mod tests {
         let color = Vec3::new(1.0, 2.0, 4.0);
         // Three times the colour, but for a channel that hardly counts.
         let found = (Vec3::new(3.0, 6.0, 40.0), Vec3::new(0.1, 0.1, 30.0));
-        let prior =
-            Prior::new(2, 1, Vec3::splat(0.1)).with_outside_found(|_| found, |_, _| Some(color));
+        let prior = Prior::new(2, 1, Vec3::splat(0.1))
+            .with_outside_found(|_| found, |_, _| Some((color, OUTSIDE_TINT)));
         let (mean, precision) = prior.of(3, DVec3::ONE);
         let ratio = mean / color.as_dvec3();
         assert!(ratio.abs_diff_eq(DVec3::splat(3.0), 1e-2));
         let deviation = precision.powf(-0.5) / mean;
         assert!((deviation - f64::from(OUTSIDE_TINT)).abs().max_element() < 1e-6);
         // Dark ones may still be something.
-        let dark = Prior::new(2, 1, Vec3::ONE)
-            .with_outside_found(|_| (Vec3::ZERO, Vec3::ONE), |_, _| Some(color));
+        let dark = Prior::new(2, 1, Vec3::ONE).with_outside_found(
+            |_| (Vec3::ZERO, Vec3::ONE),
+            |_, _| Some((color, OUTSIDE_TINT)),
+        );
         let (mean, precision) = dark.of(3, DVec3::ONE);
         assert!(mean == DVec3::ZERO && precision.is_finite() && precision.x > 0.0);
         assert_eq!(brightness(color, Vec3::ONE, Vec3::INFINITY), 0.0);
         // ... and more where light that is much brighter than the photographs shines beside them: 8, 0 and 16, whose mean is 8.
         let bright = |surface| Vec3::splat([8.0, 0.0, 16.0][surface - 1]);
-        let beside = Prior::new(4, 1, Vec3::ONE)
-            .with_outside_found(|k| (bright(k), Vec3::ONE), |_, _| Some(Vec3::ONE));
+        let beside = Prior::new(4, 1, Vec3::ONE).with_outside_found(
+            |k| (bright(k), Vec3::ONE),
+            |_, _| Some((Vec3::ONE, OUTSIDE_TINT)),
+        );
         for (parameter, expected) in [(5, 8.0), (6, 8.0), (7, 16.0)] {
             let deviation = beside.of(parameter, DVec3::ONE).1.x.powf(-0.5);
             assert!((deviation / (expected * f64::from(OUTSIDE_TINT)) - 1.0).abs() < 1e-5);
         }
+        // Light of unknown colour may be any.
+        let unknown = Prior::new(2, 1, Vec3::splat(0.1))
+            .with_outside_found(|_| found, |_, _| Some((color, UNKNOWN_TINT)));
+        let (mean, precision) = unknown.of(3, DVec3::ONE);
+        assert!((precision * mean * mean - DVec3::ONE).length() < 1e-4);
     }
 
     #[test]

@@ -289,8 +289,11 @@ mod tests {
         let from = Unknowns::new(SURFACES);
         let [dense, sparse] = both().map(|e| propose(&e, &free, &from, 1e-10).0);
         let mut at_bounds = 0;
+        // A residual of TOLERANCE leaves an error of that times the condition of the preconditioned system.
+        let tolerance = 10.0 * TOLERANCE as f32;
         for &i in &free {
-            assert!((dense.value(i) - sparse.value(i)).length() < 1e-5, "{i}");
+            let difference = (dense.value(i) - sparse.value(i)).length();
+            assert!(difference < tolerance, "{i}: {difference}");
             at_bounds += usize::from(dense.value(i).min_element() == 0.0);
         }
         assert!(at_bounds > 5 && at_bounds < FREE, "{at_bounds}");

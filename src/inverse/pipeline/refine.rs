@@ -23,7 +23,7 @@ use glam::Vec3;
 const NONLINEAR: f32 = 0.3;
 /// Relative standard error below which an emission counts as well determined.
 const WELL_KNOWN: f32 = 0.3;
-/// Least number of rounds that show how noisy their own sum is.
+/// Number of rounds that show how noisy their own sum is. After fewer, it must be smaller in proportion.
 const TELLING_ROUNDS: u32 = 4;
 /// Increase of the held-out loss, in standard errors, above which a warning is given: a chance of 3·10⁻⁵.
 const WORSE: f64 = 4.0;
@@ -155,7 +155,9 @@ impl Pipeline<'_, '_> {
             self.path_noise = path_noise::fractions(&found.clusters, self.roles.len());
             // The effect of textures is relative to the present linearisation, which then must stay.
             let may_restart = self.detail.is_none() && round < most.min(self.budget.rounds) / 4;
-            let far = may_restart && is_nonlinear(&rounds.about, &self.unknowns, &self.errors);
+            let objects = self.problem.scene.objects.len();
+            let far =
+                may_restart && is_nonlinear(&rounds.about, &self.unknowns, &self.errors, objects);
             self.describe();
             self.monitor
                 .report(&self.estimate, &|_| self.checkpoint.clone())?;
@@ -315,26 +317,28 @@ struct Reported {
 }
 
 impl Reported {
-    /// Whether more paths would gain little after some rounds: the error is below its target, or the part due to path noise is
-    /// negligible.
+    /// Whether more paths would gain little: the error is below its target, or the part due to path noise is negligible.
     fn is_enough(&self, aim: Aim, rounds: u32) -> bool {
         let targets = [aim.median, aim.tail];
-        let negligible = |i: usize| self.of_paths[i] < self.all[i] * aim.path_noise;
-        (0..2).all(|i| self.all[i] < targets[i] || rounds >= TELLING_ROUNDS && negligible(i))
+        let told = f64::from(rounds.min(TELLING_ROUNDS)) / f64::from(TELLING_ROUNDS);
+        let negligible = |i: usize| self.of_paths[i] < self.all[i] * aim.path_noise * told;
+        (0..2).all(|i| self.all[i] < targets[i] || negligible(i))
     }
 }
 
 /// Whether a step's second-order term, about its square, is not small compared with the standard errors. Albedos count absolutely,
-/// emissions relatively. Badly determined lamps do not count: radiance is linear in them, and albedos depend little on them.
-fn is_nonlinear(from: &Unknowns, to: &Unknowns, errors: &StandardErrors) -> bool {
+/// emissions of objects relatively. Badly determined lamps do not count: radiance is linear in them, and albedos depend little on
+/// them. Nor do the many directions of outside light: paths swap light between neighbours, and albedos move with their sum alone.
+fn is_nonlinear(from: &Unknowns, to: &Unknowns, errors: &StandardErrors, objects: usize) -> bool {
     let exceeds = |step: Vec3, size: Vec3, error: Vec3| {
         let known = error.cmpgt(Vec3::ZERO) & error.cmplt(Vec3::INFINITY);
         (known & (step * step).cmpgt(size * error * NONLINEAR)).any()
     };
     let albedo = (from.albedo.iter().zip(&to.albedo).zip(&errors.albedo))
         .any(|((a, b), error)| exceeds(*b - *a, Vec3::ONE, *error));
-    let emission =
-        (from.emission.iter().zip(&to.emission).zip(&errors.emission)).any(|((a, b), error)| {
+    let emission = (from.emission.iter().zip(&to.emission).zip(&errors.emission))
+        .take(objects)
+        .any(|((a, b), error)| {
             let size = a.max(*b);
             let known = error.cmple(size * WELL_KNOWN);
             exceeds(*b - *a, size, Vec3::select(known, *error, Vec3::INFINITY))
@@ -355,15 +359,18 @@ mod tests {
         };
         let from = unknowns(0.5, 10.0);
         // Uncertain parameters may move far, certain ones may not.
-        assert!(!is_nonlinear(&from, &unknowns(0.6, 10.0), &errors));
+        assert!(!is_nonlinear(&from, &unknowns(0.6, 10.0), &errors, 2));
         errors.albedo[0] = Vec3::splat(0.003);
-        assert!(is_nonlinear(&from, &unknowns(0.6, 10.0), &errors));
-        assert!(!is_nonlinear(&from, &unknowns(0.51, 10.0), &errors));
+        assert!(is_nonlinear(&from, &unknowns(0.6, 10.0), &errors, 2));
+        assert!(!is_nonlinear(&from, &unknowns(0.51, 10.0), &errors, 2));
         // Emissions count relatively.
-        assert!(!is_nonlinear(&from, &unknowns(0.5, 10.1), &errors));
-        assert!(is_nonlinear(&from, &unknowns(0.5, 10.3), &errors));
+        assert!(!is_nonlinear(&from, &unknowns(0.5, 10.1), &errors, 2));
+        assert!(is_nonlinear(&from, &unknowns(0.5, 10.3), &errors, 2));
         // An uncertain lamp may vanish.
         errors.emission[1] = Vec3::splat(4.0);
-        assert!(!is_nonlinear(&from, &unknowns(0.5, 0.0), &errors));
+        assert!(!is_nonlinear(&from, &unknowns(0.5, 0.0), &errors, 2));
+        // Nor does light from outside count.
+        errors.emission[1] = Vec3::splat(0.01);
+        assert!(!is_nonlinear(&from, &unknowns(0.5, 10.3), &errors, 1));
     }
 }
