@@ -44,7 +44,7 @@ pub struct ImportArguments {
     /// Up axis of the capture [default: the cameras' mean up]
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
     up: Option<DVec3>,
-    /// Intrinsics of the colour camera, in pixels with centres at whole numbers, for a scan that has none
+    /// Intrinsics of the colour camera, in pixels with centres at whole numbers, for a scan that has none; half the size is the middle
     #[arg(long, value_name = "FX,FY,CX,CY", value_parser = intrinsics, allow_hyphen_values = true)]
     intrinsics: Option<[f64; 4]>,
     /// Nerfstudio's applied_transform [default: undone for a mesh that comes from elsewhere]

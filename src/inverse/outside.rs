@@ -129,12 +129,14 @@ impl MeasuredOutside {
         &self.halves[usize::from(direction.dot(self.up) > 0.0)]
     }
 
-    /// Cells with a flag and their radiances, on both sides of the horizon.
-    fn cells_with(&self, flags: fn(&Half) -> &[bool]) -> impl Iterator<Item = (usize, Vec3)> {
-        [-self.up, self.up].into_iter().flat_map(move |side| {
-            let flags = flags(self.half(side));
+    /// Measured cells on both sides of the horizon, with their radiances and whether these are lower bounds.
+    fn known_cells(&self) -> impl Iterator<Item = (usize, Vec3, bool)> {
+        [-self.up, self.up].into_iter().flat_map(|side| {
+            let half = self.half(side);
             let cells = self.map.pixels_from(side).iter().copied().enumerate();
-            cells.filter(move |(cell, _)| flags[*cell])
+            cells
+                .filter(|(cell, _)| half.known[*cell])
+                .map(|(cell, radiance)| (cell, radiance, half.censored[cell]))
         })
     }
 
@@ -144,43 +146,35 @@ impl MeasuredOutside {
     }
 
     /// Expected radiance of an unmeasured direction: the mean over measured directions within ± `band` / 2 radians of its
-    /// elevation, or over all measured directions. And whether most of these are lower bounds, which say nothing of its colour.
+    /// elevation, or over all measured directions. And whether its colour is known: most of these are no lower bounds.
     pub fn expected(&self, direction: Vec3, band: f64) -> (Vec3, bool) {
         let elevation_of = |d: Vec3| f64::from(d.dot(self.up).clamp(-1.0, 1.0)).asin();
         let elevation = elevation_of(direction);
         let [width, height] = self.map.size();
         // Sums of radiance, of solid angles, and of those with lower bounds.
-        let (mut near, mut all) = ([(DVec3::ZERO, 0.0, 0.0); 2]).into();
-        for censored in [false, true] {
-            let flags: fn(&Half) -> &[bool] = match censored {
-                true => |half| &half.censored,
-                false => |half| &half.known,
+        let (mut near, mut all) = ((DVec3::ZERO, 0.0, 0.0), (DVec3::ZERO, 0.0, 0.0));
+        for (cell, radiance, is_bound) in self.known_cells() {
+            let seen = direction_of(width, height, cell);
+            let solid_angle = f64::from(1.0 - seen.y * seen.y).max(0.0).sqrt();
+            let radiance = radiance.as_dvec3() * solid_angle;
+            let bound = if is_bound { solid_angle } else { 0.0 };
+            let add = |sum: &mut (DVec3, f64, f64)| {
+                *sum = (sum.0 + radiance, sum.1 + solid_angle, sum.2 + bound);
             };
-            for (cell, radiance) in self.cells_with(flags) {
-                let seen = direction_of(width, height, cell);
-                let solid_angle = f64::from(1.0 - seen.y * seen.y).max(0.0).sqrt();
-                let term = match censored {
-                    true => (DVec3::ZERO, 0.0, solid_angle),
-                    false => (radiance.as_dvec3() * solid_angle, solid_angle, 0.0),
-                };
-                let add = |sum: &mut (DVec3, f64, f64)| {
-                    *sum = (sum.0 + term.0, sum.1 + term.1, sum.2 + term.2);
-                };
-                add(&mut all);
-                if (elevation_of(seen) - elevation).abs() < 0.5 * band {
-                    add(&mut near);
-                }
+            add(&mut all);
+            if (elevation_of(seen) - elevation).abs() < 0.5 * band {
+                add(&mut near);
             }
         }
         let (sum, weight, bounds) = if near.1 > 0.0 { near } else { all };
         let mean = (sum / f64::max(weight, f64::MIN_POSITIVE)).as_vec3();
-        (mean, 2.0 * bounds > weight)
+        (mean, 2.0 * bounds <= weight)
     }
 
     /// Mean of the lower bounds; black if there are none.
     pub fn mean_bound(&self) -> Vec3 {
-        let bounds = || self.cells_with(|half| &half.censored);
-        let sum: DVec3 = bounds().map(|(_, bound)| bound.as_dvec3()).sum();
+        let bounds = || self.known_cells().filter(|(.., is_bound)| *is_bound);
+        let sum: DVec3 = bounds().map(|(_, bound, _)| bound.as_dvec3()).sum();
         (sum / bounds().count().max(1) as f64).as_vec3()
     }
 

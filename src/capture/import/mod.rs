@@ -94,7 +94,8 @@ pub struct ImportOptions {
     pub keep_poses: bool,
     /// Up direction, written into the capture.
     pub up: Option<DVec3>,
-    /// fx, fy, cx, cy of the colour camera in pixels, pixel centres at whole numbers, for scans without intrinsics.
+    /// fx, fy, cx, cy of the colour camera in pixels, pixel centres at whole numbers, for scans without intrinsics. A principal
+    /// point of exactly half the size is the middle.
     pub intrinsics: Option<[f64; 4]>,
     /// How Nerfstudio's `applied_transform` is treated.
     pub applied_transform: AppliedTransform,

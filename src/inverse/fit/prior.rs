@@ -21,9 +21,9 @@ const SUN_DEVIATION: f32 = 1e3;
 
 /// Standard deviation of each channel of outside radiance about its expected colour, relative to its fitted brightness. Of 0.03,
 /// 0.1 and 0.3 it gives the least albedo error in `relit trade --rooms 12 --family window --preset preview`.
-pub const OUTSIDE_TINT: f32 = 0.1;
+const OUTSIDE_TINT: f32 = 0.1;
 /// The same where nothing shows the colour: each channel may be off by as much as the whole.
-pub const UNKNOWN_TINT: f32 = 1.0;
+const UNKNOWN_TINT: f32 = 1.0;
 
 /// Relative standard deviation of a known value: small enough that nothing moves it.
 const KNOWN: f64 = 1e-12;
@@ -61,6 +61,8 @@ pub struct Prior {
     outside: usize,
     /// Mean and standard deviation of the radiance of each outside direction.
     pub directions: Vec<(Vec3, Vec3)>,
+    /// Relative deviation of each outside direction's channels about its expected colour, once its brightness is fitted.
+    tints: Vec<f32>,
     /// Mean radiance of all photographs.
     photographed: Vec3,
     scanned: bool,
@@ -75,6 +77,7 @@ impl Prior {
             albedo: ExpectedAlbedo::unknown(surfaces, &[]),
             outside,
             directions: vec![(Vec3::ZERO, photographed * OUTSIDE_DEVIATION); surfaces - outside],
+            tints: vec![OUTSIDE_TINT; surfaces - outside],
             photographed,
             scanned: false,
             known: BTreeMap::new(),
@@ -110,12 +113,20 @@ impl Prior {
         self
     }
 
-    /// The prior with the given means of the outside directions, by surface. A direction may be off by as much as its mean, and in
-    /// a modelled room by as much as the brightest of them: one sky shines through all windows.
-    pub fn with_sky(mut self, expected: impl Fn(u32) -> Vec3) -> Self {
+    /// The prior with the given means of the outside directions, by surface, and whether their colours are known. A direction may
+    /// be off by as much as its mean, and in a modelled room by as much as the brightest of them: one sky shines through all
+    /// windows.
+    pub fn with_sky(mut self, expected: impl Fn(u32) -> (Vec3, bool)) -> Self {
         let mut brightest = Vec3::ZERO;
-        for (surface, (mean, deviation)) in (self.outside as u32..).zip(&mut self.directions) {
-            *mean = expected(surface);
+        let directions = self.directions.iter_mut().zip(&mut self.tints);
+        for (surface, ((mean, deviation), tint)) in (self.outside as u32..).zip(directions) {
+            let has_color;
+            (*mean, has_color) = expected(surface);
+            *tint = if has_color {
+                OUTSIDE_TINT
+            } else {
+                UNKNOWN_TINT
+            };
             *deviation = deviation.max(*mean);
             brightest = brightest.max(*deviation);
         }
@@ -131,16 +142,17 @@ impl Prior {
     ///
     /// The effect of a direction on the room may determine little more than its brightness, and channels fitted independently
     /// would give colours from noise. `found` gives the fitted radiance and its standard error by surface; `color` gives the
-    /// expected colour and its relative deviation, from the surface and its previous mean, or `None` for a surface whose prior stays.
+    /// expected colour, from the surface and its previous mean, or `None` for a surface whose prior stays.
     pub fn with_outside_found(
         mut self,
         found: impl Fn(usize) -> (Vec3, Vec3),
-        color: impl Fn(u32, Vec3) -> Option<(Vec3, f32)>,
+        color: impl Fn(u32, Vec3) -> Option<Vec3>,
     ) -> Self {
-        let surfaces = (self.outside..).zip(&mut self.directions);
-        let mut expected: Vec<_> = surfaces
-            .filter_map(|(surface, direction)| {
-                let (color, tint) = color(surface as u32, direction.0)?;
+        let directions = self.directions.iter_mut().zip(&self.tints);
+        let mut expected: Vec<_> = (self.outside..)
+            .zip(directions)
+            .filter_map(|(surface, (direction, tint))| {
+                let color = color(surface as u32, direction.0)?;
                 let (radiance, error) = found(surface);
                 direction.0 = color * brightness(color, radiance, error);
                 Some((direction, tint))
@@ -150,7 +162,7 @@ impl Prior {
         let sum: Vec3 = expected.iter().map(|(direction, _)| direction.0).sum();
         let least = self.photographed.max(sum / expected.len().max(1) as f32);
         for ((mean, deviation), tint) in &mut expected {
-            *deviation = mean.max(least) * *tint;
+            *deviation = mean.max(least) * **tint;
         }
         self
     }
@@ -221,34 +233,31 @@ mod tests {
         let color = Vec3::new(1.0, 2.0, 4.0);
         // Three times the colour, but for a channel that hardly counts.
         let found = (Vec3::new(3.0, 6.0, 40.0), Vec3::new(0.1, 0.1, 30.0));
-        let prior = Prior::new(2, 1, Vec3::splat(0.1))
-            .with_outside_found(|_| found, |_, _| Some((color, OUTSIDE_TINT)));
+        let prior =
+            Prior::new(2, 1, Vec3::splat(0.1)).with_outside_found(|_| found, |_, _| Some(color));
         let (mean, precision) = prior.of(3, DVec3::ONE);
         let ratio = mean / color.as_dvec3();
         assert!(ratio.abs_diff_eq(DVec3::splat(3.0), 1e-2));
         let deviation = precision.powf(-0.5) / mean;
         assert!((deviation - f64::from(OUTSIDE_TINT)).abs().max_element() < 1e-6);
         // Dark ones may still be something.
-        let dark = Prior::new(2, 1, Vec3::ONE).with_outside_found(
-            |_| (Vec3::ZERO, Vec3::ONE),
-            |_, _| Some((color, OUTSIDE_TINT)),
-        );
+        let dark = Prior::new(2, 1, Vec3::ONE)
+            .with_outside_found(|_| (Vec3::ZERO, Vec3::ONE), |_, _| Some(color));
         let (mean, precision) = dark.of(3, DVec3::ONE);
         assert!(mean == DVec3::ZERO && precision.is_finite() && precision.x > 0.0);
         assert_eq!(brightness(color, Vec3::ONE, Vec3::INFINITY), 0.0);
         // ... and more where light that is much brighter than the photographs shines beside them: 8, 0 and 16, whose mean is 8.
         let bright = |surface| Vec3::splat([8.0, 0.0, 16.0][surface - 1]);
-        let beside = Prior::new(4, 1, Vec3::ONE).with_outside_found(
-            |k| (bright(k), Vec3::ONE),
-            |_, _| Some((Vec3::ONE, OUTSIDE_TINT)),
-        );
+        let beside = Prior::new(4, 1, Vec3::ONE)
+            .with_outside_found(|k| (bright(k), Vec3::ONE), |_, _| Some(Vec3::ONE));
         for (parameter, expected) in [(5, 8.0), (6, 8.0), (7, 16.0)] {
             let deviation = beside.of(parameter, DVec3::ONE).1.x.powf(-0.5);
             assert!((deviation / (expected * f64::from(OUTSIDE_TINT)) - 1.0).abs() < 1e-5);
         }
         // Light of unknown colour may be any.
         let unknown = Prior::new(2, 1, Vec3::splat(0.1))
-            .with_outside_found(|_| found, |_, _| Some((color, UNKNOWN_TINT)));
+            .with_sky(|_| (Vec3::ONE, false))
+            .with_outside_found(|_| found, |_, _| Some(color));
         let (mean, precision) = unknown.of(3, DVec3::ONE);
         assert!((precision * mean * mean - DVec3::ONE).length() < 1e-4);
     }
@@ -256,8 +265,8 @@ mod tests {
     #[test]
     fn lamps_are_free_and_the_outside_is_held_near_what_was_seen_in_any_unit() {
         for unit in [1e-12f32, 1.0, 1e12] {
-            let prior =
-                Prior::new(5, 3, Vec3::splat(2.0 * unit)).with_sky(|_| Vec3::splat(3.0 * unit));
+            let prior = Prior::new(5, 3, Vec3::splat(2.0 * unit))
+                .with_sky(|_| (Vec3::splat(3.0 * unit), true));
             let noise = DVec3::splat(0.1);
             assert_eq!(prior.of(0, noise), (DVec3::splat(0.5), noise / 0.25));
             assert_eq!(prior.of(5 + 2, noise), (DVec3::ZERO, DVec3::ZERO));
@@ -268,7 +277,8 @@ mod tests {
         }
         // In a scan each direction is held to its own mean, and no tighter than to the photographs; the sun is as good as free.
         let scan = Prior::new(6, 3, Vec3::splat(2.0)).of_scan();
-        let scan = scan.with_sky(|surface| Vec3::splat([0.5, 5.0, 0.0][surface as usize - 3]));
+        let scan =
+            scan.with_sky(|surface| (Vec3::splat([0.5, 5.0, 0.0][surface as usize - 3]), true));
         for (surface, deviation) in [(3, 2.0f64), (4, 5.0), (5, 2000.0)] {
             let (_, precision) = scan.of(6 + surface, DVec3::ONE);
             assert!((precision * deviation.powi(2) - DVec3::ONE).length() < 1e-6);

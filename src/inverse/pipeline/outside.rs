@@ -4,7 +4,7 @@ use crate::calibrate::measured_radiance::MeasuredRadiance;
 use crate::inverse::fit::equations::NormalEquations;
 use crate::inverse::fit::errors::StandardErrors;
 use crate::inverse::fit::gauss_newton::{MIN_DAMPING, propose};
-use crate::inverse::fit::prior::{OUTSIDE_TINT, Prior, UNKNOWN_TINT};
+use crate::inverse::fit::prior::Prior;
 use crate::inverse::fit::robust_weights::RobustWeights;
 use crate::inverse::outside::MeasuredOutside;
 use crate::inverse::paths::PathCache;
@@ -63,8 +63,9 @@ impl Pipeline<'_, '_> {
             let grid = self.outside;
             let band = std::f64::consts::PI / grid.height as f64;
             let expected = |surface| match grid.direction(surface) {
-                None => Vec3::ZERO,
-                Some(direction) => sky.expected(direction, band).0,
+                // Saturated pixels show a light's brightness at least, and nothing of its colour.
+                None => (Vec3::ZERO, false),
+                Some(direction) => sky.expected(direction, band),
             };
             self.prior = self.prior.clone().with_sky(expected);
         }
@@ -265,19 +266,12 @@ impl Pipeline<'_, '_> {
         let photographed = mean_radiance(&self.clusters);
         let bound = self.sky.as_ref().map(|sky| sky.mean_bound());
         let grid = self.outside;
-        let band = std::f64::consts::PI / grid.height as f64;
-        // Saturated pixels show a light's brightness at least, and nothing of its colour.
-        let tint = |surface: u32| match (&self.sky, grid.direction(surface)) {
-            (Some(sky), Some(direction)) if sky.expected(direction, band).1 => UNKNOWN_TINT,
-            (_, None) => UNKNOWN_TINT,
-            _ => OUTSIDE_TINT,
-        };
         let color = |surface: u32, expected: Vec3| match bound {
             // Sunlight falls on what it lights directly, so that each of its channels is determined.
             _ if surface == grid.sun_surface() => None,
-            Some(bound) if grid.is_excess(surface) => Some((bound, tint(surface))),
-            Some(_) => Some((expected, tint(surface))),
-            None => Some((photographed, OUTSIDE_TINT)),
+            Some(bound) if grid.is_excess(surface) => Some(bound),
+            Some(_) => Some(expected),
+            None => Some(photographed),
         };
         let found = |k: usize| (self.unknowns.emission[k], self.errors.emission[k]);
         self.prior = self.prior.clone().with_outside_found(found, color);
