@@ -5,7 +5,8 @@ use glam::DVec3;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use relit::calibrate::gbuffer::GBuffer;
 use relit::calibrate::held_out::HoldOut;
-use relit::inverse::fit::errors::{signal, standard_errors};
+use relit::inverse::fit::equations::MIN_SIGNAL;
+use relit::inverse::fit::errors::standard_errors;
 use relit::inverse::fit::gauss_newton::fit;
 use relit::inverse::fit::prior::Prior;
 use relit::inverse::fit::robust_weights::RobustWeights;
@@ -122,7 +123,7 @@ fn fit_in_f64(
         let mut hessian = DMatrix::<f64>::zeros(n, n);
         let mut descent = DVector::<f64>::zeros(n);
         let mut objective = 0.0;
-        let [mut scatter, mut across] = [vec![0.0; n], vec![0.0; n]];
+        let [mut path_scatter, mut across] = [vec![0.0; n], vec![0.0; n]];
         for cached in &cache.clusters {
             let [(la, ja), (lb, jb)] = means(cached, &x, channel);
             let measured = f64::from(cached.cluster.measured[channel]);
@@ -132,9 +133,9 @@ fn fit_in_f64(
             let (ra, rb) = (measured - la, measured - lb);
             objective += weight * ra * rb;
             for (i, &p) in free.iter().enumerate() {
-                let score = 0.5 * (wa * ja[p] * rb + wb * jb[p] * ra);
-                descent[i] += score;
-                scatter[i] += score * score;
+                let [score_a, score_b] = [wa * ja[p] * rb, wb * jb[p] * ra];
+                descent[i] += 0.5 * (score_a + score_b);
+                path_scatter[i] += (0.5 * (score_a - score_b)).powi(2);
                 across[i] += weight * ja[p] * jb[p];
                 for (j, &q) in free.iter().enumerate() {
                     hessian[(i, j)] += 0.25 * weight * (ja[p] + jb[p]) * (ja[q] + jb[q]);
@@ -143,9 +144,9 @@ fn fit_in_f64(
         }
         let mean_noise = (objective / cache.clusters.len() as f64).max(1e-12);
         for (i, &p) in free.iter().enumerate() {
-            let curvature = signal(DVec3::splat(hessian[(i, i)]), DVec3::splat(across[i])).x;
+            let curvature = across[i].max(MIN_SIGNAL * hessian[(i, i)]);
             let noise = match hessian[(i, i)] > 0.0 {
-                true => mean_noise.max(scatter[i] / curvature),
+                true => mean_noise + path_scatter[i] / curvature,
                 false => mean_noise,
             };
             // The program's prior knows surfaces outside too; here there are none.

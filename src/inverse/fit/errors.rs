@@ -1,7 +1,6 @@
 //! Standard errors of fitted parameters, and score tests of parameters held fixed.
 
 use crate::inverse::fit::equations::{Coupling, Matrices, NormalEquations, per_channel};
-use crate::inverse::fit::gauss_newton::prior_variance;
 use crate::inverse::fit::prior::ALBEDO_DEVIATION;
 use crate::inverse::fit::robust_weights::RobustWeights;
 use crate::inverse::fit::rows::Rows;
@@ -19,8 +18,6 @@ const DRAW_TOLERANCE: f64 = 1e-2;
 const KEY: u64 = 0x6d75_6c74;
 /// Number of parameters that are tested exactly without dense matrices.
 const MAX_EXACT: usize = 24;
-/// Least fraction of a curvature that is taken to be signal.
-const MIN_SIGNAL: f64 = 0.05;
 /// Least value of one minus a cluster's leverage.
 const MIN_KEPT: f64 = 0.1;
 /// Least fraction of its curvature that a parameter keeps when the active ones are eliminated. Below, it is degenerate.
@@ -83,7 +80,7 @@ pub fn standard_errors(
     };
     for (row, (&index, variance)) in free.iter().zip(variances).enumerate() {
         let diagonal = equations.diagonal[row];
-        let inflation = (diagonal / signal(diagonal, equations.across[row])).max(DVec3::ONE);
+        let inflation = (diagonal / equations.signal(row)).max(DVec3::ONE);
         let own = variance.max(DVec3::ZERO).powf(0.5);
         let of_prior = DVec3::select(
             prior.precision[row].cmpgt(DVec3::ZERO),
@@ -143,24 +140,19 @@ fn quadratic(matrix: &DMatrix<f64>, cluster: &Linearised, channel: usize) -> f64
     sum
 }
 
-/// A parameter's curvature without the noise of its derivatives, from `diagonal` and `across` of [`NormalEquations`].
-pub fn signal(diagonal: DVec3, across: DVec3) -> DVec3 {
-    across.max(diagonal * MIN_SIGNAL)
-}
-
 /// The prior of the free parameters, in the units of the normal equations.
 struct PriorTerms {
     precision: Vec<DVec3>,
     /// Terms added to the diagonal: the precision, and one for parameters that no path meets.
     added: Vec<DVec3>,
-    /// [`prior_variance`] of each parameter.
+    /// [`NormalEquations::prior_variance`] of each parameter.
     variance: Vec<DVec3>,
 }
 
 impl PriorTerms {
     fn new(equations: &NormalEquations, free: &[usize]) -> Self {
         let variance: Vec<DVec3> = (0..free.len())
-            .map(|row| prior_variance(equations, row))
+            .map(|row| equations.prior_variance(row))
             .collect();
         let precision: Vec<DVec3> = (free.iter().zip(&variance))
             .map(|(&i, &variance)| equations.prior.of(i, variance).1)

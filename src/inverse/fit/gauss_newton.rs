@@ -1,7 +1,6 @@
 //! Finds the zero of the unbiased descent direction within bounds by Gauss–Newton steps.
 
 use crate::inverse::fit::equations::{Coupling, Matrices, NormalEquations, per_channel};
-use crate::inverse::fit::errors::signal;
 use crate::inverse::fit::prior::Prior;
 use crate::inverse::fit::robust_weights::RobustWeights;
 use crate::inverse::fit::step::Step;
@@ -30,18 +29,6 @@ pub struct Fit {
     pub equations: NormalEquations,
     /// Number of steps taken.
     pub iterations: u64,
-}
-
-/// Variance of a cluster's residual by which the prior of the free parameter in `row` is weighed: the scatter of its scores over
-/// its curvature, the ratio that makes the mean squared error of a shrunken estimate least. Both contain the noise of its
-/// derivatives, so that parameters that few paths meet stay nearer to their prior. At least the mean over all clusters without path
-/// noise, since a parameter that one cluster determines has no scatter.
-pub fn prior_variance(equations: &NormalEquations, row: usize) -> DVec3 {
-    let mean = equations.objective / equations.clusters.max(1) as f64;
-    let diagonal = equations.diagonal[row];
-    let own = equations.scatter[row] / signal(diagonal, equations.across[row]);
-    let own = DVec3::select(diagonal.cmpgt(DVec3::ZERO), own, DVec3::ZERO);
-    mean.max(own).max(DVec3::splat(1e-12))
 }
 
 /// Fits the free parameters (indices into albedos, then emissions). `between` receives the equations after
@@ -129,7 +116,7 @@ pub fn relative_gradient(equations: &NormalEquations, free: &[usize], at: &Unkno
 /// The direction of descent of each free parameter, including the prior.
 fn gradients(equations: &NormalEquations, free: &[usize], at: &Unknowns) -> Vec<DVec3> {
     let with_prior = |(row, &i): (usize, &usize)| {
-        let (mean, precision) = equations.prior.of(i, prior_variance(equations, row));
+        let (mean, precision) = equations.prior_of(row, i);
         equations.descent[row] + precision * (mean - at.value(i).as_dvec3())
     };
     free.iter().enumerate().map(with_prior).collect()
@@ -168,7 +155,7 @@ pub fn propose(
         (free.iter().zip(&equations.diagonal).enumerate())
             .map(|(row, (&i, diagonal))| {
                 let unmet = DVec3::select(diagonal.cmpgt(DVec3::ZERO), DVec3::ZERO, DVec3::ONE);
-                let precision = equations.prior.of(i, prior_variance(equations, row)).1;
+                let precision = equations.prior_of(row, i).1;
                 *diagonal * damping + precision + unmet
             })
             .collect()
@@ -191,7 +178,7 @@ pub fn propose(
             let counted = change.cmpgt(DVec3::ZERO) & curvature.cmpgt(DVec3::ZERO);
             DVec3::select(counted, change / noise, DVec3::ZERO).max_element()
         };
-        let across = signal(equations.diagonal[row], equations.across[row]);
+        let across = equations.signal(row);
         length.step = length.step.max(relative(across));
         length.remaining = length.remaining.max(relative(equations.diagonal[row]));
         *proposal.value_mut(i) = y.as_vec3();
@@ -328,8 +315,8 @@ mod tests {
         assert!(equations.objective.max_element() < 0.0);
         let start = Unknowns::grey([0.5], [0.0]);
         let (next, _) = propose(&equations, &[0], &start, MIN_DAMPING);
-        // One residual of 0.4 and a prior of 0.01: the precisions' mean is 40² times nearer to the prior.
-        let expected = 0.5 + 0.4 / (1.0 + 40.0 * 40.0);
+        // One residual of 0.4, a half difference of 0.6 and a prior of 0.01, which weighs 60² times as much.
+        let expected = 0.5 + 0.4 / (1.0 + 60.0 * 60.0);
         assert!((next.albedo[0] - expected).abs().max_element() < 1e-6);
     }
 }

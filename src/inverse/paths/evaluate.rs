@@ -55,9 +55,14 @@ impl Linearised {
     /// Each row's term of the unbiased right-hand side, for a weight per channel: ½ w (J_A r_B + J_B r_A). Each residual is weighed
     /// at the radiance of the other set, whose noise is not its own.
     pub fn scores(&self, weight: DVec3) -> impl Iterator<Item = DVec3> + '_ {
+        self.set_scores(weight).map(|[a, b]| (a + b) * 0.5)
+    }
+
+    /// The terms of both sets, whose mean is [`Self::scores`]: w J_A r_B and w J_B r_A. They differ by path noise alone.
+    pub fn set_scores(&self, weight: DVec3) -> impl Iterator<Item = [DVec3; 2]> + '_ {
         let [ra, rb] = self.residuals;
         let [wa, wb] = self.of_sets;
-        (self.rows.iter()).map(move |&(_, ja, jb)| weight * (ja * rb * wa + jb * ra * wb) * 0.5)
+        (self.rows.iter()).map(move |&(_, ja, jb)| [ja * rb * wa, jb * ra * wb].map(|s| weight * s))
     }
 }
 
