@@ -6,6 +6,7 @@
 use crate::inverse::fit::prior::Prior;
 use crate::inverse::fit::robust_weights::RobustWeights;
 use crate::inverse::fit::rows::Rows;
+use crate::inverse::fit::sparse_rows::SparseRows;
 use crate::inverse::paths::PathCache;
 use crate::inverse::paths::evaluate::Linearised;
 use crate::inverse::roles::places;
@@ -20,6 +21,8 @@ const MAX_DENSE: usize = 1024;
 
 /// Least fraction of a curvature that is taken to be signal.
 pub const MIN_SIGNAL: f64 = 0.05;
+/// Clusters that are summed by one thread, in their order.
+const CHUNK: usize = 2048;
 /// Blocks of lines of a matrix that each thread sums. Work is known only roughly, and the rows are read once per block.
 const BLOCKS_A_THREAD: usize = 4;
 
@@ -62,12 +65,9 @@ pub enum Coupling {
 pub struct Matrices {
     /// Per channel: Σ w J̄ J̄ᵀ, positive semidefinite; only the lower triangle is set.
     pub hessian: [DMatrix<f64>; 3],
-    /// Each cluster's contributions to the descent.
-    scores: Vec<SparseRow>,
+    /// Each cluster's contributions to the descent, [`CHUNK`] clusters each.
+    scores: Vec<SparseRows>,
 }
-
-/// Entries of one cluster by increasing parameter.
-type SparseRow = Vec<(usize, DVec3)>;
 
 impl PathCache {
     /// The normal equations for the parameters in `free` (indices into albedos, then emissions).
@@ -107,35 +107,25 @@ impl NormalEquations {
         prior: &Prior,
         coupling: Coupling,
     ) -> Self {
-        let active = || linearised.iter().filter(|c| !c.bound_met().all());
-        let mut sums = Self {
-            descent: vec![DVec3::ZERO; n],
-            diagonal: vec![DVec3::ZERO; n],
-            across: vec![DVec3::ZERO; n],
-            scatter: vec![DVec3::ZERO; n],
-            path_scatter: vec![DVec3::ZERO; n],
-            objective: DVec3::ZERO,
-            clusters: active().count(),
-            pixels: active().map(|c| c.pixels).sum(),
+        let chunks: Vec<Sums> = (linearised.par_chunks(CHUNK))
+            .map(|chunk| Sums::new(chunk, n, robust))
+            .collect();
+        let mut total = Sums::new(&[], n, robust);
+        chunks.iter().for_each(|chunk| total.add(chunk));
+        let [descent, diagonal, across, scatter, path_scatter] =
+            [0, 1, 2, 3, 4].map(|sum| total.parameters.iter().map(|sums| sums[sum]).collect());
+        Self {
+            descent,
+            diagonal,
+            across,
+            scatter,
+            path_scatter,
+            objective: total.objective,
+            clusters: total.clusters,
+            pixels: total.pixels,
             prior: prior.clone(),
             coupling,
-        };
-        for cluster in linearised {
-            let weight = robust.weight(cluster);
-            sums.objective += weight * cluster.residuals[0] * cluster.residuals[1];
-            for (&(i, a, b), [score_a, score_b]) in
-                cluster.rows.iter().zip(cluster.set_scores(weight))
-            {
-                let mean = (a + b) * 0.5;
-                let [score, noise] = [(score_a + score_b) * 0.5, (score_a - score_b) * 0.5];
-                sums.descent[i] += score;
-                sums.diagonal[i] += weight * mean * mean;
-                sums.across[i] += weight * a * b;
-                sums.scatter[i] += score * score;
-                sums.path_scatter[i] += noise * noise;
-            }
         }
-        sums
     }
 
     /// A parameter's curvature without the noise of its derivatives.
@@ -164,20 +154,74 @@ impl NormalEquations {
     }
 }
 
+/// Sums over some of the clusters.
+struct Sums {
+    /// Of each parameter: descent, diagonal, across, scatter and path scatter of [`NormalEquations`].
+    parameters: Vec<[DVec3; 5]>,
+    objective: DVec3,
+    clusters: usize,
+    pixels: f64,
+}
+
+impl Sums {
+    fn new(clusters: &[Linearised], n: usize, robust: &RobustWeights) -> Self {
+        let active = || clusters.iter().filter(|c| !c.bound_met().all());
+        let mut sums = Self {
+            parameters: vec![[DVec3::ZERO; 5]; n],
+            objective: DVec3::ZERO,
+            clusters: active().count(),
+            pixels: active().map(|c| c.pixels).sum(),
+        };
+        for cluster in clusters {
+            let weight = robust.weight(cluster);
+            sums.objective += weight * cluster.residuals[0] * cluster.residuals[1];
+            for (&(i, a, b), [of_a, of_b]) in cluster.rows.iter().zip(cluster.set_scores(weight)) {
+                let mean = (a + b) * 0.5;
+                let [score, noise] = [(of_a + of_b) * 0.5, (of_a - of_b) * 0.5];
+                let [descent, diagonal, across, scatter, path_scatter] = &mut sums.parameters[i];
+                *descent += score;
+                *diagonal += weight * mean * mean;
+                *across += weight * a * b;
+                *scatter += score * score;
+                *path_scatter += noise * noise;
+            }
+        }
+        sums
+    }
+
+    fn add(&mut self, other: &Self) {
+        for (sums, others) in self.parameters.iter_mut().zip(&other.parameters) {
+            for (sum, other) in sums.iter_mut().zip(others) {
+                *sum += *other;
+            }
+        }
+        self.objective += other.objective;
+        self.clusters += other.clusters;
+        self.pixels += other.pixels;
+    }
+}
+
 impl Matrices {
     /// From linearised clusters with `n` free parameters.
     pub fn new(linearised: &[Linearised], n: usize, robust: &RobustWeights) -> Self {
-        let rows = |cluster: &Linearised| -> (SparseRow, SparseRow) {
-            let weight = robust.weight(cluster);
-            let root = weight.powf(0.5);
-            let scores = cluster.rows.iter().zip(cluster.scores(weight));
-            let mut both: Vec<_> = scores
-                .map(|(&(i, a, b), score)| ((i, root * (a + b) * 0.5), (i, score)))
-                .collect();
-            both.sort_unstable_by_key(|(slope, _)| slope.0);
-            both.into_iter().unzip()
+        let rows = |clusters: &[Linearised]| {
+            let (mut slopes, mut scores) = (SparseRows::default(), SparseRows::default());
+            let mut both: Vec<(u32, DVec3, DVec3)> = Vec::new();
+            for cluster in clusters {
+                let weight = robust.weight(cluster);
+                let root = weight.powf(0.5);
+                both.clear();
+                both.extend(
+                    (cluster.rows.iter().zip(cluster.scores(weight)))
+                        .map(|(&(i, a, b), score)| (i as u32, root * (a + b) * 0.5, score)),
+                );
+                both.sort_unstable_by_key(|entry| entry.0);
+                slopes.push(both.iter().map(|&(i, slope, _)| (i, slope)));
+                scores.push(both.iter().map(|&(i, _, score)| (i, score)));
+            }
+            (slopes, scores)
         };
-        let (slopes, scores): (Vec<_>, Vec<_>) = linearised.par_iter().map(rows).unzip();
+        let (slopes, scores): (Vec<_>, Vec<_>) = linearised.par_chunks(CHUNK).map(rows).unzip();
         Self {
             hessian: gram(&slopes, n),
             scores,
@@ -191,19 +235,20 @@ impl Matrices {
 
     /// Divides each cluster's contribution to the scatter by its entry of `divisors`.
     pub fn divide_scores(&mut self, divisors: &[DVec3]) {
-        for (scores, divisor) in self.scores.iter_mut().zip(divisors) {
-            scores.iter_mut().for_each(|(_, score)| *score /= *divisor);
+        let mut divisors = divisors.iter();
+        for scores in &mut self.scores {
+            scores.divide(&mut divisors);
         }
     }
 }
 
 /// Per channel: the lower triangle of Σ v vᵀ over sparse rows v of `n` parameters.
-fn gram(rows: &[SparseRow], n: usize) -> [DMatrix<f64>; 3] {
+fn gram(rows: &[SparseRows], n: usize) -> [DMatrix<f64>; 3] {
     // Blocks of lines with equal work. Each goes through the rows in their order, so that no sum depends on their number.
     let mut work = vec![0; n];
-    for entries in rows {
+    for entries in rows.iter().flat_map(SparseRows::iter) {
         for (index, (parameter, _)) in entries.iter().enumerate() {
-            work[*parameter] += index + 1;
+            work[*parameter as usize] += index + 1;
         }
     }
     let most = work.iter().sum::<usize>() / (BLOCKS_A_THREAD * rayon::current_num_threads()) + 1;
@@ -219,15 +264,16 @@ fn gram(rows: &[SparseRow], n: usize) -> [DMatrix<f64>; 3] {
         .map(|ends| {
             let block = ends[0]..ends[1];
             let mut lines: Vec<_> = block.clone().map(|i| vec![DVec3::ZERO; i + 1]).collect();
-            for row in rows {
-                let start = row.partition_point(|entry| entry.0 < block.start);
+            for row in rows.iter().flat_map(SparseRows::iter) {
+                let start = row.partition_point(|entry| (entry.0 as usize) < block.start);
                 for (index, (i, factor)) in row.iter().enumerate().skip(start) {
-                    if *i >= block.end {
+                    let i = *i as usize;
+                    if i >= block.end {
                         break;
                     }
                     let line = &mut lines[i - block.start];
                     for (j, value) in &row[..=index] {
-                        line[*j] += *factor * *value;
+                        line[*j as usize] += *factor * *value;
                     }
                 }
             }

@@ -10,4 +10,5 @@ pub mod path_noise;
 pub mod prior;
 pub mod robust_weights;
 pub mod rows;
+pub mod sparse_rows;
 pub mod step;

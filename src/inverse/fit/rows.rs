@@ -38,13 +38,30 @@ pub struct Rows {
 impl Rows {
     /// From linearised clusters with `n` free parameters.
     pub fn new(linearised: &[Linearised], n: usize, robust: &RobustWeights) -> Self {
+        let parts: Vec<Self> = (linearised.par_chunks(linearised.len().div_ceil(PARTS).max(1)))
+            .map(|clusters| Self::part(clusters, n, robust))
+            .collect();
+        let mut all = Self::part(&[], n, robust);
+        for part in parts {
+            let before = all.slopes.len();
+            all.slopes.extend(part.slopes);
+            all.scores.extend(part.scores);
+            all.ends.extend(part.ends.iter().map(|end| before + end));
+            for (sum, more) in all.diagonal.iter_mut().zip(part.diagonal) {
+                *sum += more;
+            }
+        }
+        all
+    }
+
+    fn part(clusters: &[Linearised], n: usize, robust: &RobustWeights) -> Self {
         let mut this = Self {
             slopes: Vec::new(),
             scores: Vec::new(),
-            ends: Vec::with_capacity(linearised.len()),
+            ends: Vec::with_capacity(clusters.len()),
             diagonal: vec![DVec3::ZERO; n],
         };
-        for cluster in linearised {
+        for cluster in clusters {
             let weight = robust.weight(cluster);
             let root = weight.powf(0.5);
             for (&(parameter, a, b), score) in cluster.rows.iter().zip(cluster.scores(weight)) {

@@ -79,7 +79,10 @@ impl PathCache {
         self.clusters
             .par_iter()
             .map_init(
-                || ([(); 2].map(|()| Gradient::new(parameters)), Vec::new()),
+                || {
+                    let gradients = [(); 2].map(|()| Gradient::new(parameters));
+                    (gradients, Vec::new(), Vec::new())
+                },
                 |scratch, cluster| linearise(cluster, unknowns, row_of, reflected, scratch),
             )
             .collect()
@@ -152,7 +155,7 @@ fn linearise(
     unknowns: &Unknowns,
     row_of: &[usize],
     reflected: &[Vec3],
-    (gradients, incident): &mut Scratch,
+    (gradients, incident, rows): &mut Scratch,
 ) -> Linearised {
     gradients.iter_mut().for_each(Gradient::clear);
     let means = means(cached, |vertices, set| {
@@ -164,7 +167,7 @@ fn linearise(
     // The free parameters that either set touches.
     let [a, b] = &*gradients;
     let scale = scale(cached);
-    let mut rows = Vec::new();
+    rows.clear();
     for &t in a
         .touched
         .iter()
@@ -191,12 +194,12 @@ fn linearise(
         pixels: cached.cluster.pixels.len() as f64,
         residuals,
         censored: cached.cluster.censored,
-        rows,
+        rows: rows.to_vec(),
     }
 }
 
-/// Memory reused between clusters: a gradient of each set, and what arrives along a path.
-type Scratch = ([Gradient; 2], Vec<Vec3A>);
+/// Memory reused between clusters: a gradient of each set, what arrives along a path, and rows.
+type Scratch = ([Gradient; 2], Vec<Vec3A>, Vec<(usize, DVec3, DVec3)>);
 
 #[cfg(test)]
 impl Linearised {
