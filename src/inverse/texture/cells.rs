@@ -206,6 +206,12 @@ impl Cells {
         }
     }
 
+    /// The cell of a pixel's hit; `None` on the other side than most pixels see.
+    pub fn facing(&self, hit: &PixelHit) -> Option<u32> {
+        let facing = self.front(hit.hit.triangle)? == hit.front;
+        facing.then(|| self.locate(&hit.hit)).flatten()
+    }
+
     /// Whether pixels see the front of a triangle; `None` if no pixel sees it.
     pub fn front(&self, triangle: u32) -> Option<bool> {
         self.roots.get(&triangle).map(|root| root.front)

@@ -7,6 +7,7 @@
 use crate::inverse::texture::fit::{Measurements, Texture};
 use crate::inverse::texture::fuse::{System, penalties};
 use crate::inverse::texture::links::Links;
+use crate::inverse::texture::normal_matrix::NormalMatrix;
 use crate::math::color::luminance;
 use crate::math::rng::Stream;
 use glam::Vec3;
@@ -29,19 +30,18 @@ pub fn standard_errors(
     let unit = measurements.unit();
     let strength = texture.strength.unwrap_or(0.0);
     let colors: Vec<Vec3> = texture.colors.iter().map(|c| *c / unit).collect();
+    let matrix = NormalMatrix::new(measurements.observations, &measurements.weights);
     let system = System {
-        observations: &measurements.observations,
-        row_weights: &measurements.weights,
+        matrix: &matrix,
         links,
         penalties: penalties(links, &vec![1.0; count], strength, &colors),
         prior_weight: texture.prior_weight,
     };
-    let data = measurements.observations.diagonal(&measurements.weights);
     let deviations = (0..DRAWS).into_par_iter().map(|draw| {
-        let right = perturbation(&system, seed, object, draw);
+        let right = perturbation(&system, measurements, seed, object, draw);
         let mut deviation = vec![Vec3::ZERO; count];
         for _ in 0..3 {
-            system.solve(&data, &right, &mut deviation);
+            system.solve(&right, &mut deviation);
         }
         deviation
     });
@@ -68,17 +68,21 @@ pub fn standard_errors(
 }
 
 /// Noise of unit variance on every measurement, difference and prior, as a right-hand side.
-fn perturbation(system: &System, seed: u64, object: usize, draw: u64) -> Vec<Vec3> {
+fn perturbation(
+    system: &System,
+    measurements: &Measurements,
+    seed: u64,
+    object: usize,
+    draw: u64,
+) -> Vec<Vec3> {
     let normal = |kind: u64, index: usize| {
         let mut stream = Stream::new(seed, 3 * object as u64 + kind, index as u64, KEY + draw);
         Vec3::new(stream.normal(), stream.normal(), stream.normal())
     };
-    let measured: Vec<Vec3> = (system.row_weights.par_iter().enumerate())
+    let measured: Vec<Vec3> = (measurements.weights.par_iter().enumerate())
         .map(|(row, weight)| normal(0, row) / weight.max(Vec3::splat(f32::MIN_POSITIVE)).powf(0.5))
         .collect();
-    let mut right = system
-        .observations
-        .transpose_times(system.row_weights, &measured);
+    let mut right = (measurements.observations).transpose_times(&measurements.weights, &measured);
     for cell in 0..right.len() {
         for (at, other) in system
             .links

@@ -38,9 +38,9 @@ const CLIP: f64 = 30.0;
 
 /// The pixels of an object that are in the fit, as measurements of its albedo.
 #[derive(Debug, Clone)]
-pub struct Measurements {
+pub struct Measurements<'a> {
     /// The cells that each pixel sees.
-    pub observations: Observations,
+    pub observations: &'a Observations,
     /// Albedo of each pixel: measured radiance, minus that of a lobe, over that of a white surface.
     pub albedo: Vec<Vec3>,
     /// Weight of each pixel and channel: the squared radiance of a white surface over the pixel's variance, scaled to a mean of
@@ -69,9 +69,9 @@ pub struct Texture {
     pub prior_weight: f32,
 }
 
-impl Measurements {
+impl<'a> Measurements<'a> {
     /// From pixels, and the radiance `white` of each cell with an albedo of one.
-    pub fn new(pixels: &[&SeenPixel], observations: Observations, white: &[Vec3]) -> Self {
+    pub fn new(pixels: &[&SeenPixel], observations: &'a Observations, white: &[Vec3]) -> Self {
         let irradiance: Vec<Vec3> = (observations.values(white).iter().zip(pixels))
             .map(|(r, pixel)| *r * pixel.base)
             .collect();
@@ -154,7 +154,7 @@ impl Measurements {
         let folds = (ENOUGH * FOLDS / self.albedo.len().max(1)).clamp(min_folds, FOLDS);
         let fitted = |weights: &[Vec3], strength, start: &[Vec3], prior_weight| {
             let problem = Problem {
-                observations: &self.observations,
+                observations: self.observations,
                 weights,
                 values: &values,
                 links,
@@ -230,6 +230,7 @@ impl Measurements {
     /// The weights, with those of one fold and of inactive rows set to zero.
     fn weights_at(&self, colors: &[Vec3], values: &[Vec3], without: Option<usize>) -> Vec<Vec3> {
         (0..values.len())
+            .into_par_iter()
             .map(|row| {
                 let out = without == Some(self.folds[row]) || !self.is_active(row, colors, values);
                 if out { Vec3::ZERO } else { self.weights[row] }
@@ -250,18 +251,19 @@ impl Measurements {
     /// Mean squared residual of the cross-validated pixels, each for the colours fitted without it; zero for lower bounds that are
     /// met.
     fn score(&self, values: &[Vec3], colors: &[Vec<Vec3>], clip: f64) -> f64 {
-        let (mut sum, mut count) = (0.0, 0u64);
-        for (row, value) in values.iter().enumerate() {
-            if let Some(colors) = colors.get(self.folds[row]) {
+        let squares: Vec<Option<f64>> = (values.par_iter().enumerate())
+            .map(|(row, value)| {
+                let colors = colors.get(self.folds[row])?;
                 let residual = *value - self.observations.value(row, colors);
                 let square = f64::from((residual * residual).dot(self.weights[row]));
-                if self.is_active(row, colors, values) {
-                    sum += square.min(clip);
-                }
-                count += 1;
-            }
-        }
-        sum / count.max(1) as f64
+                Some(match self.is_active(row, colors, values) {
+                    true => square.min(clip),
+                    false => 0.0,
+                })
+            })
+            .collect();
+        let sum: f64 = squares.iter().flatten().sum();
+        sum / squares.iter().flatten().count().max(1) as f64
     }
 
     /// Root mean square weighted residual of the cross-validated pixels, per channel.
@@ -341,14 +343,12 @@ mod tests {
         let rows = |cell: fn(u32) -> u32| -> Vec<Vec<(u32, f32)>> {
             (0..20).map(|i| vec![(cell(i), 1.0)]).collect()
         };
-        let half_lit = Measurements::new(
-            &seen,
-            Observations::new(&rows(|i| i % 2), 2),
-            &[Vec3::splat(0.6), Vec3::ZERO],
-        );
+        let halves = Observations::new(&rows(|i| i % 2), 2);
+        let half_lit = Measurements::new(&seen, &halves, &[Vec3::splat(0.6), Vec3::ZERO]);
         assert!((half_lit.constant - Vec3::splat(0.5)).length() < 1e-6);
         assert!(half_lit.albedo.iter().all(|a| a.is_finite()));
-        let dark = Measurements::new(&seen, Observations::new(&rows(|_| 0), 1), &[Vec3::ZERO]);
+        let one = Observations::new(&rows(|_| 0), 1);
+        let dark = Measurements::new(&seen, &one, &[Vec3::ZERO]);
         assert_eq!(dark.constant, Vec3::ZERO);
     }
 
@@ -364,7 +364,8 @@ mod tests {
             .collect();
         let seen: Vec<&SeenPixel> = pixels.iter().collect();
         let light: Vec<Vec3> = (0..100).map(white).collect();
-        let found = Measurements::new(&seen, Observations::one_per_cell(100), &light);
+        let each = Observations::one_per_cell(100);
+        let found = Measurements::new(&seen, &each, &light);
         assert!(
             (found.constant - truth).length() < 0.01,
             "{}",
@@ -406,7 +407,7 @@ mod tests {
             ..Links::default()
         };
         let observations = Observations::new(rows, cells);
-        let mut measurements = Measurements::new(&seen, observations, &vec![Vec3::ONE; cells]);
+        let mut measurements = Measurements::new(&seen, &observations, &vec![Vec3::ONE; cells]);
         let texture = measurements.fit(&links, 1, None, |_| Ok::<_, ()>(()));
         texture.expect("nothing ends it").colors
     }

@@ -7,6 +7,7 @@
 //! preconditioned conjugate gradients.
 
 use crate::inverse::texture::links::Links;
+use crate::inverse::texture::normal_matrix::NormalMatrix;
 use crate::inverse::texture::observations::Observations;
 use glam::{Vec3, Vec3A};
 use rayon::prelude::*;
@@ -59,7 +60,7 @@ fn fuse_here(problem: &Problem, strength: f32, start: &[Vec3]) -> Vec<Vec3> {
         prior,
         prior_weight,
     } = *problem;
-    let data = observations.diagonal(row_weights);
+    let matrix = NormalMatrix::new(observations, row_weights);
     let mut right = observations.transpose_times(row_weights, values);
     for (r, mean) in right.iter_mut().zip(prior) {
         *r += *mean * prior_weight;
@@ -67,14 +68,13 @@ fn fuse_here(problem: &Problem, strength: f32, start: &[Vec3]) -> Vec<Vec3> {
     let mut colors = start.to_vec();
     for _ in 0..MAX_REWEIGHTINGS {
         let system = System {
-            observations,
-            row_weights,
+            matrix: &matrix,
             links,
             penalties: penalties(links, levels, strength, &colors),
             prior_weight,
         };
         let before = colors.clone();
-        system.solve(&data, &right, &mut colors);
+        system.solve(&right, &mut colors);
         let change: f64 = sum(&colors, &before, |a, b| f64::from((a - b).length_squared()));
         if change <= CONVERGED * CONVERGED * colors.len() as f64 {
             break;
@@ -104,10 +104,8 @@ pub fn penalties(links: &Links, levels: &[f32], strength: f32, colors: &[Vec3]) 
 
 /// The normal equations of one reweighting.
 pub struct System<'a> {
-    /// The weights of cells in each measurement.
-    pub observations: &'a Observations,
-    /// ω of each measurement, per channel.
-    pub row_weights: &'a [Vec3],
+    /// The measurements' part of the matrix.
+    pub matrix: &'a NormalMatrix,
     /// The graph of neighbours.
     pub links: &'a Links,
     /// The weight of each link's squared difference.
@@ -117,20 +115,20 @@ pub struct System<'a> {
 }
 
 impl System<'_> {
-    /// Solves for the right-hand side by conjugate gradients, starting at `colors`; `data` is the diagonal of the data term.
-    pub fn solve(&self, data: &[Vec3], right: &[Vec3], colors: &mut [Vec3]) {
+    /// Solves for the right-hand side by conjugate gradients, starting at `colors`.
+    pub fn solve(&self, right: &[Vec3], colors: &mut [Vec3]) {
         let scale: Vec<Vec3A> = (0..colors.len())
             .into_par_iter()
             .with_min_len(TASK)
             .map(|cell| {
                 let penalty: f32 = self.penalties[self.links.row(cell)].iter().sum();
-                Vec3A::from(data[cell] + penalty + self.prior_weight).recip()
+                Vec3A::from(self.matrix.diagonal[cell] + penalty + self.prior_weight).recip()
             })
             .collect();
         let mut found: Vec<Vec3A> = colors.iter().map(|&c| c.into()).collect();
-        let mut product = Product::default();
+        let mut product = Vec::new();
         self.apply(&found, &mut product);
-        let mut residual: Vec<Vec3A> = (product.result.iter().zip(right))
+        let mut residual: Vec<Vec3A> = (product.iter().zip(right))
             .map(|(p, b)| Vec3A::from(*b) - *p)
             .collect();
         let mut direction: Vec<Vec3A> = (residual.iter().zip(&scale))
@@ -143,12 +141,12 @@ impl System<'_> {
                 break;
             }
             self.apply(&direction, &mut product);
-            let alpha = (rz / dot(&direction, &product.result)) as f32;
+            let alpha = (rz / dot(&direction, &product)) as f32;
             if !alpha.is_finite() {
                 break;
             }
             (found.par_iter_mut().zip(&mut residual))
-                .zip(direction.par_iter().zip(&product.result))
+                .zip(direction.par_iter().zip(&product))
                 .with_min_len(TASK)
                 .for_each(|((x, r), (d, p))| {
                     *x += *d * alpha;
@@ -171,38 +169,16 @@ impl System<'_> {
     }
 
     /// The product of the matrix and a vector, whose colours are padded so that each is read at once.
-    fn apply(&self, x: &[Vec3A], product: &mut Product) {
-        (0..self.observations.rows())
-            .into_par_iter()
-            .with_min_len(TASK)
-            .map(|row| {
-                let cells = self.observations.row(row);
-                let value: Vec3A = cells.map(|(cell, w)| x[cell] * w).sum();
-                value * Vec3A::from(self.row_weights[row])
-            })
-            .collect_into_vec(&mut product.measured);
-        let measured = &product.measured;
-        (0..x.len())
-            .into_par_iter()
-            .with_min_len(TASK)
-            .map(|cell| {
-                let data: Vec3A = (self.observations.column(cell))
-                    .map(|(row, w)| measured[row] * w)
-                    .sum();
-                let smooth: Vec3A = (self.links.neighbours(cell))
-                    .map(|(at, other)| (x[cell] - x[other]) * self.penalties[at])
-                    .sum();
-                data + smooth + x[cell] * self.prior_weight
-            })
-            .collect_into_vec(&mut product.result);
+    fn apply(&self, x: &[Vec3A], product: &mut Vec<Vec3A>) {
+        let smooth = |cell: usize| {
+            let links = self.links.neighbours(cell);
+            let differences: Vec3A = links
+                .map(|(at, other)| (x[cell] - x[other]) * self.penalties[at])
+                .sum();
+            differences + x[cell] * self.prior_weight
+        };
+        self.matrix.product(x, smooth, product);
     }
-}
-
-/// The result of a product, and the weighted measurements on the way, kept for the next one.
-#[derive(Default)]
-struct Product {
-    measured: Vec<Vec3A>,
-    result: Vec<Vec3A>,
 }
 
 fn dot(a: &[Vec3A], b: &[Vec3A]) -> f64 {

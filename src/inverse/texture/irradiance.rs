@@ -1,11 +1,12 @@
 //! The irradiance of cells: traced in two independent sets, then smoothed as much as each set predicts the other best.
 
 use crate::inverse::texture::cells::Cells;
+use crate::inverse::texture::coverage::Coverage;
 use crate::inverse::texture::fuse::{Problem, fuse, mean, mean_channel};
 use crate::inverse::texture::gloss::white_base;
 use crate::inverse::texture::links::Links;
 use crate::inverse::texture::look::SeenPixel;
-use crate::inverse::texture::observations::{Observations, row_range};
+use crate::inverse::texture::observations::Observations;
 use crate::math::color::luminance;
 use crate::math::rng::Stream;
 use crate::math::warp;
@@ -40,36 +41,8 @@ pub struct Irradiance {
     pub cast: RayCount,
 }
 
-/// The points of each cell that pixels see.
-#[derive(Debug, Clone)]
-pub struct SeenPoints {
-    /// End of each cell's points.
-    ends: Vec<u32>,
-    points: Vec<Hit>,
-}
-
-impl SeenPoints {
-    /// The hits of the pixels, by cell.
-    pub fn new(cells: &Cells, pixels: &[SeenPixel]) -> Self {
-        let hits = pixels.iter().flat_map(|pixel| &pixel.hits);
-        let mut located: Vec<(u32, Hit)> = hits
-            .filter_map(|l| Some((cells.locate(&l.hit)?, l.hit)))
-            .collect();
-        located.sort_by_key(|&(cell, _)| cell);
-        let ends = (0..cells.count() as u32)
-            .map(|cell| located.partition_point(|&(other, _)| other <= cell) as u32)
-            .collect();
-        Self {
-            ends,
-            points: located.into_iter().map(|(_, hit)| hit).collect(),
-        }
-    }
-
-    /// The points of a cell.
-    fn of(&self, cell: usize) -> &[Hit] {
-        &self.points[row_range(&self.ends, cell)]
-    }
-}
+/// Where pixels see the cells, and these pixels.
+pub type Seen<'a> = (&'a Coverage, &'a [SeenPixel]);
 
 /// Smoothed irradiance.
 #[derive(Debug, Clone)]
@@ -85,7 +58,7 @@ pub struct Smoothed {
 pub fn trace(
     lit: &LitScene,
     cells: &Cells,
-    seen: &SeenPoints,
+    seen: Seen,
     range: Range<usize>,
     samples: u32,
     options: &PathOptions,
@@ -125,7 +98,7 @@ pub fn trace(
 fn point_on(
     lit: &LitScene,
     cells: &Cells,
-    seen: &SeenPoints,
+    seen: Seen,
     cell: usize,
     stream: &mut Stream,
 ) -> (Hit, Vec3) {
@@ -137,10 +110,11 @@ fn point_on(
         let front = cells.front(hit.triangle).unwrap_or(true);
         (hit, if front { normal } else { -normal })
     };
-    let points = seen.of(cell);
-    if !points.is_empty() {
-        let index = (choice * points.len() as f32) as usize;
-        return oriented(points[index.min(points.len() - 1)]);
+    let (coverage, pixels) = seen;
+    let count = coverage.count(cell);
+    if count > 0 {
+        let index = (choice * count as f32) as usize;
+        return oriented(coverage.hit(pixels, cell, index.min(count - 1)));
     }
     let cell = &cells.cells[cell];
     let piece = match cell.pieces.as_slice() {

@@ -7,6 +7,7 @@
 //! one colour ([`trial`]).
 
 mod cells;
+mod coverage;
 mod errors;
 mod fit;
 mod fuse;
@@ -14,6 +15,7 @@ mod gloss;
 mod irradiance;
 mod links;
 mod look;
+mod normal_matrix;
 mod observations;
 mod surface;
 mod trial;

@@ -73,6 +73,11 @@ impl Observations {
         self.column_ends.len()
     }
 
+    /// Number of rows that see a cell.
+    pub fn seen(&self, cell: usize) -> u32 {
+        row_range(&self.column_ends, cell).len() as u32
+    }
+
     /// The cells and weights of a row.
     #[inline]
     pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, f32)> + '_ {

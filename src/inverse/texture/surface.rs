@@ -3,13 +3,13 @@
 use crate::calibrate::gbuffer::GBufferPixel;
 use crate::inverse::solver::Termination;
 use crate::inverse::texture::cells::Cells;
+use crate::inverse::texture::coverage::Coverage;
 use crate::inverse::texture::errors::{standard_errors, with_light};
 use crate::inverse::texture::fit::{Measurements, Texture};
 use crate::inverse::texture::gloss::trace_gloss;
-use crate::inverse::texture::irradiance::{Irradiance, SeenPoints, trace};
+use crate::inverse::texture::irradiance::{Irradiance, trace};
 use crate::inverse::texture::links::Links;
 use crate::inverse::texture::look::{FOLDS, RAYS, SeenPixel, sample_pixels};
-use crate::inverse::texture::observations::Observations;
 use crate::inverse::texture::trial::{TestPixel, Trial, compare};
 use crate::inverse::texture::{Step, Task};
 use crate::scene::Scene;
@@ -42,10 +42,8 @@ pub struct TexturedSurface {
     pub cells: Cells,
     /// The graph of neighbouring cells.
     pub links: Links,
-    /// Number of pixels in the fit that see each cell.
-    pub seen: Vec<u32>,
-    /// Area of each cell that pixels in the fit see, in square metres.
-    seen_area: Vec<f32>,
+    /// What the pixels see of the cells.
+    pub coverage: Coverage,
     /// The latest texture.
     pub texture: Texture,
     /// The best single albedo for the same pixels and irradiance.
@@ -94,18 +92,16 @@ impl TexturedSurface {
         width: f32,
     ) -> Option<Self> {
         let cells = Cells::new(scene, &pixels, width);
-        // Cells have one side, whose irradiance is traced: pixels that see the other side are left out.
-        pixels.retain(|p| (p.hits.iter()).all(|l| cells.front(l.hit.triangle) == Some(l.front)));
+        let coverage = Coverage::new(&cells, &mut pixels);
         if pixels.iter().all(|p| p.held_out || p.saturated) {
             return None;
         }
         let links = Links::new(scene, &cells);
-        let mut surface = Self {
+        Some(Self {
             object,
             glossy,
             seed,
-            seen: vec![0; cells.count()],
-            seen_area: Vec::new(),
+            coverage,
             texture: Texture {
                 colors: vec![Vec3::ZERO; cells.count()],
                 strength: None,
@@ -118,14 +114,7 @@ impl TexturedSurface {
             pixels,
             cells,
             links,
-        };
-        for row in surface.rows() {
-            for (cell, _) in row {
-                surface.seen[cell as usize] += 1;
-            }
-        }
-        surface.seen_area = surface.seen_areas();
-        Some(surface)
+        })
     }
 
     /// Traces the irradiance and fits the texture. `errors`, the relative standard error of the object's overall albedo, asks for
@@ -141,14 +130,13 @@ impl TexturedSurface {
     ) -> Result<(), Termination> {
         let samples = (paths / (2 * self.cells.count() as u64)).clamp(1, MAX_SAMPLES) as u32;
         let key = (u64::from(sweep) << 32) + self.object as u64;
-        let seen = SeenPoints::new(&self.cells, &self.pixels);
         let mut irradiance = Irradiance::default();
         for start in (0..self.cells.count()).step_by(SLICE) {
             let range = start..(start + SLICE).min(self.cells.count());
             let part = trace(
                 lit,
                 &self.cells,
-                &seen,
+                (&self.coverage, &self.pixels),
                 range,
                 samples,
                 options,
@@ -167,9 +155,9 @@ impl TexturedSurface {
                 done(Step::cast(cast))?;
             }
         }
-        let observations = Observations::new(&self.rows(), self.cells.count());
         let fitted: Vec<&SeenPixel> = self.pixels.iter().filter(|p| !p.held_out).collect();
-        let mut measurements = Measurements::new(&fitted, observations, &light.radiance);
+        let mut measurements =
+            Measurements::new(&fitted, &self.coverage.observations, &light.radiance);
         // A highlight is wrong in a whole photograph: whether a glossy object has a texture at all, all folds decide.
         let decides = self.glossy && sweep == 0;
         let min_folds = if decides { FOLDS } else { 1 };
@@ -246,7 +234,7 @@ impl TexturedSurface {
     /// Mean albedo over the area that pixels see.
     pub fn mean(&self) -> Vec3 {
         let (mut sum, mut area) = (DVec3::ZERO, 0.0);
-        for (color, seen) in self.texture.colors.iter().zip(&self.seen_area) {
+        for (color, seen) in self.texture.colors.iter().zip(&self.coverage.areas) {
             sum += color.as_dvec3() * f64::from(*seen);
             area += f64::from(*seen);
         }
@@ -255,41 +243,5 @@ impl TexturedSurface {
         } else {
             self.constant
         }
-    }
-
-    /// The area of each cell below the rays of the pixels in the fit, at most all of it.
-    fn seen_areas(&self) -> Vec<f32> {
-        let mut areas = vec![0.0; self.cells.count()];
-        for hit in (self.pixels.iter().filter(|p| !p.held_out)).flat_map(|p| &p.hits) {
-            if let Some(cell) = self.cells.locate(&hit.hit) {
-                areas[cell as usize] += hit.footprint * hit.footprint / RAYS as f32;
-            }
-        }
-        let cells = self.cells.cells.iter();
-        (areas.iter().zip(cells))
-            .map(|(area, cell)| area.min(cell.size * cell.size))
-            .collect()
-    }
-
-    /// For each pixel in the fit, the cells that it sees and the fraction of its rays on each.
-    fn rows(&self) -> Vec<Vec<(u32, f32)>> {
-        (self.pixels.iter().filter(|p| !p.held_out))
-            .map(|pixel| {
-                let fraction = 1.0 / pixel.hits.len() as f32;
-                let mut row: Vec<(u32, f32)> = (pixel.hits.iter())
-                    .filter_map(|l| self.cells.locate(&l.hit))
-                    .map(|cell| (cell, fraction))
-                    .collect();
-                row.sort_by_key(|&(cell, _)| cell);
-                row.dedup_by(|next, kept| {
-                    let same = next.0 == kept.0;
-                    if same {
-                        kept.1 += next.1;
-                    }
-                    same
-                });
-                row
-            })
-            .collect()
     }
 }

@@ -29,7 +29,7 @@ fn interpolated(surface: &TexturedSurface, tree: &RTree<Center>, point: Vec3) ->
     let neighbours = near.map(|center| Neighbour {
         distance: Vec3::from(*center.geom()).distance(point),
         size: surface.cells.cells[center.data].size,
-        seen: surface.seen[center.data],
+        seen: surface.coverage.observations.seen(center.data),
         color: surface.texture.colors[center.data],
     });
     mean_color(neighbours)
@@ -84,7 +84,7 @@ pub fn texels(scene: &Scene, estimate: &Estimate, surfaces: &[TexturedSurface]) 
 
     for surface in surfaces {
         let centers: Vec<Center> = (0..surface.cells.count())
-            .filter(|&cell| surface.seen[cell] > 0)
+            .filter(|&cell| surface.coverage.observations.seen(cell) > 0)
             .map(|cell| GeomWithData::new(surface.cells.cells[cell].center.to_array(), cell))
             .collect();
         let tree = RTree::bulk_load(centers);
@@ -103,7 +103,7 @@ pub fn texels(scene: &Scene, estimate: &Estimate, surfaces: &[TexturedSurface]) 
                 let at = (first + texel) as usize;
                 if let Some(cell) = surface.cells.locate(&hit) {
                     colors[at] = surface.texture.colors[cell as usize];
-                    seen[at] = surface.seen[cell as usize];
+                    seen[at] = surface.coverage.observations.seen(cell as usize);
                     stderr[at] = surface.stderr.get(cell as usize).copied().unwrap_or(unseen);
                 } else {
                     colors[at] = interpolated(surface, &tree, scene.point(&hit)).unwrap_or(mean);
