@@ -10,6 +10,7 @@ use relit::inverse::fit::errors::standard_errors;
 use relit::inverse::fit::gauss_newton::fit;
 use relit::inverse::fit::prior::Prior;
 use relit::inverse::fit::robust_weights::RobustWeights;
+use relit::inverse::fit::sparse_rows::SparseRows;
 use relit::inverse::paths::clusters::{Cluster, cluster, mean_radiance};
 use relit::inverse::paths::derivative::{Gradient, differentiate};
 use relit::inverse::paths::trace::Tracer;
@@ -183,7 +184,8 @@ fn the_fit_agrees_with_its_twin_in_f64() {
     for _ in 0..8 {
         found = again(&found.unknowns);
     }
-    let errors = standard_errors(&found.equations, &free, SURFACES);
+    let scores = SparseRows::scores(&found.clusters, free.len(), &robust, |_| DVec3::ONE);
+    let errors = standard_errors(&found.equations, &scores, &free, SURFACES);
     let mut worst = 0.0f64;
     for channel in 0..3 {
         let twin = fit_in_f64(&cache, &free, &prior, &found.unknowns, channel);

@@ -66,12 +66,12 @@ fn shift(cluster: &mut Linearised, [albedo, emission]: [usize; 2], reflected: DV
         return;
     };
     let (a, b) = (a * reflected, b * reflected);
-    match cluster.rows.iter_mut().find(|r| r.0 == albedo) {
-        Some(row) => {
-            row.1 -= a;
-            row.2 -= b;
+    match cluster.rows.binary_search_by_key(&albedo, |r| r.0) {
+        Ok(at) => {
+            cluster.rows[at].1 -= a;
+            cluster.rows[at].2 -= b;
         }
-        None => cluster.rows.push((albedo, -a, -b)),
+        Err(at) => cluster.rows.insert(at, (albedo, -a, -b)),
     }
 }
 
@@ -80,22 +80,28 @@ mod tests {
     use super::*;
     use crate::inverse::fit::linear::descend;
     use crate::inverse::roles;
+
     /// A lamp (0) of emission 10 that reflects `albedo` × 1 below and `albedo` × 3 above, seen from below. A floor (1) is lit by
     /// its lower side and a ceiling (2) by its upper side; both are photographed, with noise that cancels.
     fn room(albedo: f64, seen: bool) -> Vec<Linearised> {
+        // The emission of the lamp, the albedos of floor and ceiling.
+        let own = |object: u32, rows: &[(usize, f64)]| {
+            let row = if object == 0 { 3 } else { object as usize };
+            rows.iter().find(|r| r.0 == row).map_or(0.0, |r| r.1)
+        };
         let below = 10.0 + albedo;
         let cluster = |object: u32, measured: f64, model: f64, rows: &[(usize, f64)]| Linearised {
-            own: DVec3::splat(rows[0].1),
+            own: DVec3::splat(own(object, rows)),
             rows: (rows.iter())
                 .map(|&(row, d)| (row, DVec3::splat(d), DVec3::splat(d)))
                 .collect(),
             ..Linearised::unit(object, DVec3::splat(measured - model))
         };
         // Rows: albedos of lamp, floor, ceiling, and the lamp's emission; about emission 10, albedos 0 and 0.5.
-        let lamp = cluster(0, below, 10.0, &[(3, 1.0), (0, 1.0)]);
-        let floor = cluster(1, 0.5 * below, 5.0, &[(1, 10.0), (3, 0.5), (0, 0.5)]);
+        let lamp = cluster(0, below, 10.0, &[(0, 1.0), (3, 1.0)]);
+        let floor = cluster(1, 0.5 * below, 5.0, &[(0, 0.5), (1, 10.0), (3, 0.5)]);
         let above = 0.5 * (10.0 + 3.0 * albedo);
-        let ceiling = cluster(2, above, 5.0, &[(2, 10.0), (3, 0.5), (0, 1.5)]);
+        let ceiling = cluster(2, above, 5.0, &[(0, 1.5), (2, 10.0), (3, 0.5)]);
         let mut all: Vec<Linearised> = std::iter::repeat_n([lamp, floor, ceiling], 40)
             .flatten()
             .collect();
@@ -105,7 +111,7 @@ mod tests {
         }
         if seen {
             // A pixel of the upper side.
-            all.push(cluster(0, 10.0 + 3.0 * albedo, 10.0, &[(3, 1.0), (0, 3.0)]));
+            all.push(cluster(0, 10.0 + 3.0 * albedo, 10.0, &[(0, 3.0), (3, 1.0)]));
         }
         all
     }

@@ -5,12 +5,8 @@
 
 use crate::inverse::fit::prior::Prior;
 use crate::inverse::fit::robust_weights::RobustWeights;
-use crate::inverse::fit::rows::Rows;
 use crate::inverse::fit::sparse_rows::SparseRows;
-use crate::inverse::paths::PathCache;
 use crate::inverse::paths::evaluate::Linearised;
-use crate::inverse::roles::places;
-use crate::inverse::unknowns::Unknowns;
 use glam::DVec3;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -23,8 +19,6 @@ const MAX_DENSE: usize = 1024;
 pub const MIN_SIGNAL: f64 = 0.05;
 /// Clusters that are summed by one thread, in their order.
 const CHUNK: usize = 2048;
-/// Blocks of lines of a matrix that each thread sums. Work is known only roughly, and the rows are read once per block.
-const BLOCKS_A_THREAD: usize = 4;
 
 /// Sums over the clusters of the fit at one value of the unknowns. Vectors have one entry per free parameter.
 #[derive(Debug, Clone)]
@@ -51,62 +45,30 @@ pub struct NormalEquations {
     pub coupling: Coupling,
 }
 
-/// Hessian and scatter of all pairs of parameters.
+/// The Hessian Σ w J̄ J̄ᵀ of all pairs of parameters.
 #[derive(Debug, Clone)]
 pub enum Coupling {
-    /// As dense matrices.
-    Dense(Matrices),
-    /// As the clusters' sparse rows.
-    Sparse(Rows),
-}
-
-/// The Hessian as dense matrices, and what its scatter is made of.
-#[derive(Debug, Clone)]
-pub struct Matrices {
-    /// Per channel: Σ w J̄ J̄ᵀ, positive semidefinite; only the lower triangle is set.
-    pub hessian: [DMatrix<f64>; 3],
-    /// Each cluster's contributions to the descent, [`CHUNK`] clusters each.
-    scores: Vec<SparseRows>,
-}
-
-impl PathCache {
-    /// The normal equations for the parameters in `free` (indices into albedos, then emissions).
-    pub fn normal_equations(
-        &self,
-        unknowns: &Unknowns,
-        free: &[usize],
-        robust: &RobustWeights,
-        prior: &Prior,
-    ) -> NormalEquations {
-        let places = places(free, unknowns.surfaces());
-        NormalEquations::new(
-            &self.linearise(unknowns, &places, &[]),
-            free.len(),
-            robust,
-            prior,
-        )
-    }
+    /// As a matrix per channel, positive semidefinite; only the lower triangle is set.
+    Dense([DMatrix<f64>; 3]),
+    /// As the clusters' rows √w J̄.
+    Sparse(SparseRows),
 }
 
 impl NormalEquations {
     /// Sums over linearised clusters with `n` free parameters.
     pub fn new(linearised: &[Linearised], n: usize, robust: &RobustWeights, prior: &Prior) -> Self {
-        let coupling = if n <= MAX_DENSE {
-            Coupling::Dense(Matrices::new(linearised, n, robust))
-        } else {
-            Coupling::Sparse(Rows::new(linearised, n, robust))
-        };
-        Self::with_coupling(linearised, n, robust, prior, coupling)
+        Self::with_at_most(MAX_DENSE, linearised, n, robust, prior)
     }
 
-    /// The same with given off-diagonal terms.
-    pub fn with_coupling(
+    /// The same with matrices of at most `max_dense` parameters.
+    pub fn with_at_most(
+        max_dense: usize,
         linearised: &[Linearised],
         n: usize,
         robust: &RobustWeights,
         prior: &Prior,
-        coupling: Coupling,
     ) -> Self {
+        let slopes = SparseRows::slopes(linearised, n, robust);
         let chunks: Vec<Sums> = (linearised.par_chunks(CHUNK))
             .map(|chunk| Sums::new(chunk, n, robust))
             .collect();
@@ -124,7 +86,11 @@ impl NormalEquations {
             clusters: total.clusters,
             pixels: total.pixels,
             prior: prior.clone(),
-            coupling,
+            coupling: if n <= max_dense {
+                Coupling::Dense(slopes.gram())
+            } else {
+                Coupling::Sparse(slopes)
+            },
         }
     }
 
@@ -199,91 +165,6 @@ impl Sums {
         self.clusters += other.clusters;
         self.pixels += other.pixels;
     }
-}
-
-impl Matrices {
-    /// From linearised clusters with `n` free parameters.
-    pub fn new(linearised: &[Linearised], n: usize, robust: &RobustWeights) -> Self {
-        let rows = |clusters: &[Linearised]| {
-            let (mut slopes, mut scores) = (SparseRows::default(), SparseRows::default());
-            let mut both: Vec<(u32, DVec3, DVec3)> = Vec::new();
-            for cluster in clusters {
-                let weight = robust.weight(cluster);
-                let root = weight.powf(0.5);
-                both.clear();
-                both.extend(
-                    (cluster.rows.iter().zip(cluster.scores(weight)))
-                        .map(|(&(i, a, b), score)| (i as u32, root * (a + b) * 0.5, score)),
-                );
-                both.sort_unstable_by_key(|entry| entry.0);
-                slopes.push(both.iter().map(|&(i, slope, _)| (i, slope)));
-                scores.push(both.iter().map(|&(i, _, score)| (i, score)));
-            }
-            (slopes, scores)
-        };
-        let (slopes, scores): (Vec<_>, Vec<_>) = linearised.par_chunks(CHUNK).map(rows).unzip();
-        Self {
-            hessian: gram(&slopes, n),
-            scores,
-        }
-    }
-
-    /// Per channel: Σ g gᵀ over the clusters' contributions g to the descent; only the lower triangle is set.
-    pub fn scatter(&self) -> [DMatrix<f64>; 3] {
-        gram(&self.scores, self.hessian[0].nrows())
-    }
-
-    /// Divides each cluster's contribution to the scatter by its entry of `divisors`.
-    pub fn divide_scores(&mut self, divisors: &[DVec3]) {
-        let mut divisors = divisors.iter();
-        for scores in &mut self.scores {
-            scores.divide(&mut divisors);
-        }
-    }
-}
-
-/// Per channel: the lower triangle of Σ v vᵀ over sparse rows v of `n` parameters.
-fn gram(rows: &[SparseRows], n: usize) -> [DMatrix<f64>; 3] {
-    // Blocks of lines with equal work. Each goes through the rows in their order, so that no sum depends on their number.
-    let mut work = vec![0; n];
-    for entries in rows.iter().flat_map(SparseRows::iter) {
-        for (index, (parameter, _)) in entries.iter().enumerate() {
-            work[*parameter as usize] += index + 1;
-        }
-    }
-    let most = work.iter().sum::<usize>() / (BLOCKS_A_THREAD * rayon::current_num_threads()) + 1;
-    let (mut starts, mut done) = (vec![0], 0);
-    for (parameter, work) in work.iter().enumerate() {
-        done += work;
-        if done >= most * starts.len() {
-            starts.push(parameter + 1);
-        }
-    }
-    starts.push(n);
-    let lines: Vec<Vec<Vec<DVec3>>> = (starts.par_windows(2))
-        .map(|ends| {
-            let block = ends[0]..ends[1];
-            let mut lines: Vec<_> = block.clone().map(|i| vec![DVec3::ZERO; i + 1]).collect();
-            for row in rows.iter().flat_map(SparseRows::iter) {
-                let start = row.partition_point(|entry| (entry.0 as usize) < block.start);
-                for (index, (i, factor)) in row.iter().enumerate().skip(start) {
-                    let i = *i as usize;
-                    if i >= block.end {
-                        break;
-                    }
-                    let line = &mut lines[i - block.start];
-                    for (j, value) in &row[..=index] {
-                        line[*j as usize] += *factor * *value;
-                    }
-                }
-            }
-            lines
-        })
-        .collect();
-    let lines: Vec<&Vec<DVec3>> = lines.iter().flatten().collect();
-    std::array::from_fn(|channel| {
-        DMatrix::from_fn(n, n, |i, j| lines[i].get(j).map_or(0.0, |v| v[channel]))
-    })
 }
 
 /// Joins what `of_channel` gives for each of the three channels, which run in parallel. All three have the same length.

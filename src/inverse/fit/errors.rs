@@ -1,9 +1,10 @@
 //! Standard errors of fitted parameters, and score tests of parameters held fixed.
 
-use crate::inverse::fit::equations::{Coupling, Matrices, NormalEquations, per_channel};
+use crate::inverse::fit::equations::{Coupling, NormalEquations, per_channel};
 use crate::inverse::fit::prior::ALBEDO_DEVIATION;
 use crate::inverse::fit::robust_weights::RobustWeights;
-use crate::inverse::fit::rows::Rows;
+use crate::inverse::fit::sparse_rows::SparseRows;
+use crate::inverse::fit::sparse_step::SparseHessian;
 use crate::inverse::paths::evaluate::Linearised;
 use crate::math::cholesky;
 use crate::math::rng::Stream;
@@ -64,15 +65,18 @@ impl ScoreTest {
 ///
 /// H contains the squared noise of the derivatives, which the descent does not. It would make parameters that few paths meet
 /// seem too certain, so errors are multiplied by the ratio of both curvatures, up to the prior's standard deviation.
+///
+/// `scores` are the clusters' [`SparseRows::scores`], or those of [`leave_one_out`].
 pub fn standard_errors(
     equations: &NormalEquations,
+    scores: &SparseRows,
     free: &[usize],
     objects: usize,
 ) -> StandardErrors {
     let prior = PriorTerms::new(equations, free);
     let variances = match &equations.coupling {
-        Coupling::Dense(matrices) => sandwich(matrices, &prior),
-        Coupling::Sparse(rows) => bootstrap(rows, &prior),
+        Coupling::Dense(hessian) => sandwich(hessian, &scores.gram(), &prior),
+        Coupling::Sparse(slopes) => bootstrap(slopes, scores, &prior, equations),
     };
     let mut errors = StandardErrors {
         albedo: vec![Vec3::splat(ALBEDO_DEVIATION); objects],
@@ -98,33 +102,31 @@ pub fn standard_errors(
     errors
 }
 
-/// The equations with leave-one-out scores in the scatter: each cluster's score over one minus its leverage (HC3, MacKinnon and
-/// White 1985). Few clusters determine a lamp or a small object, and the fit passes through them as if they had no noise. Only
-/// dense matrices are corrected; with sparse rows, errors of parameters that few clusters determine are too small.
-pub fn jackknifed(
-    mut equations: NormalEquations,
+/// The scores of clusters, each over one minus the cluster's leverage (HC3, MacKinnon and White 1985). Few clusters determine a lamp
+/// or a small object, and the fit passes through them as if they had no noise. Only with dense matrices are scores corrected; with
+/// sparse rows, errors of parameters that few clusters determine are too small.
+pub fn leave_one_out(
+    equations: &NormalEquations,
     clusters: &[Linearised],
     robust: &RobustWeights,
     free: &[usize],
-) -> NormalEquations {
-    let prior = PriorTerms::new(&equations, free);
-    if let Coupling::Dense(matrices) = &mut equations.coupling {
-        let inverses: Vec<Option<DMatrix<f64>>> = (0..3)
-            .into_par_iter()
-            .map(|c| inverse(&matrices.hessian[c], &prior.added, c))
-            .collect();
-        let kept: Vec<DVec3> = (clusters.par_iter())
-            .map(|cluster| {
-                let weight = robust.weight(cluster);
-                DVec3::from_array(std::array::from_fn(|c| {
-                    let leverage = (inverses[c].as_ref()).map_or(0.0, |m| quadratic(m, cluster, c));
-                    (1.0 - weight[c] * leverage).max(MIN_KEPT)
-                }))
-            })
-            .collect();
-        matrices.divide_scores(&kept);
-    }
-    equations
+) -> SparseRows {
+    let Coupling::Dense(hessian) = &equations.coupling else {
+        return SparseRows::scores(clusters, free.len(), robust, |_| DVec3::ONE);
+    };
+    let prior = PriorTerms::new(equations, free);
+    let inverses: Vec<Option<DMatrix<f64>>> = (0..3)
+        .into_par_iter()
+        .map(|c| inverse(&hessian[c], &prior.added, c))
+        .collect();
+    SparseRows::scores(clusters, free.len(), robust, |index| {
+        let cluster = &clusters[index];
+        let weight = robust.weight(cluster);
+        DVec3::from_array(std::array::from_fn(|c| {
+            let leverage = (inverses[c].as_ref()).map_or(0.0, |m| quadratic(m, cluster, c));
+            (1.0 - weight[c] * leverage).max(MIN_KEPT)
+        }))
+    })
 }
 
 /// J̄ᵀ M J̄ of a cluster's derivatives in one channel.
@@ -191,11 +193,14 @@ fn inverse(hessian: &DMatrix<f64>, added: &[DVec3], channel: usize) -> Option<DM
 }
 
 /// Variances from dense matrices; −1 in channels without an inverse.
-fn sandwich(matrices: &Matrices, prior: &PriorTerms) -> Vec<DVec3> {
+fn sandwich(
+    hessian: &[DMatrix<f64>; 3],
+    scatter: &[DMatrix<f64>; 3],
+    prior: &PriorTerms,
+) -> Vec<DVec3> {
     let n = prior.added.len();
-    let scatter = matrices.scatter();
     per_channel(|channel| {
-        let Some(bread) = inverse(&matrices.hessian[channel], &prior.added, channel) else {
+        let Some(bread) = inverse(&hessian[channel], &prior.added, channel) else {
             return vec![-1.0; n];
         };
         let scatter = &scatter[channel];
@@ -213,7 +218,14 @@ fn sandwich(matrices: &Matrices, prior: &PriorTerms) -> Vec<DVec3> {
 
 /// The same variances by the multiplier bootstrap (Wu 1986): with random signs ε of the clusters, (H + P)⁻¹ Σ ε g has the
 /// covariance of the estimate.
-fn bootstrap(rows: &Rows, prior: &PriorTerms) -> Vec<DVec3> {
+fn bootstrap(
+    slopes: &SparseRows,
+    scores: &SparseRows,
+    prior: &PriorTerms,
+    equations: &NormalEquations,
+) -> Vec<DVec3> {
+    let diagonal = &equations.diagonal;
+    let hessian = SparseHessian { slopes, diagonal };
     let n = prior.added.len();
     let (free, zero) = (vec![DVec3::ONE; n], vec![DVec3::ZERO; n]);
     let draws: Vec<Vec<DVec3>> = (0..DRAWS)
@@ -223,11 +235,11 @@ fn bootstrap(rows: &Rows, prior: &PriorTerms) -> Vec<DVec3> {
                 let bit = Stream::new(draw, kind, index as u64, KEY).below(2);
                 DVec3::splat([-1.0, 1.0][bit])
             };
-            let mut right = rows.scores_times(|cluster| sign(0, cluster));
+            let mut right = scores.weighted(|cluster| sign(0, cluster));
             for (i, b) in right.iter_mut().enumerate() {
                 *b += (prior.variance[i] * prior.precision[i]).powf(0.5) * sign(1, i);
             }
-            rows.solve(&prior.added, &free, &right, &zero, DRAW_TOLERANCE)
+            hessian.solve(&prior.added, &free, &right, &zero, DRAW_TOLERANCE)
         })
         .collect();
     (0..n)
@@ -236,12 +248,19 @@ fn bootstrap(rows: &Rows, prior: &PriorTerms) -> Vec<DVec3> {
 }
 
 /// Score tests (Rao 1948) of the parameters in `free` after the first `active` ones: for each, the step that it would take if it
-/// were set free together with the active ones, and the standard error of the step.
-pub fn score_tests(equations: &NormalEquations, free: &[usize], active: usize) -> Vec<ScoreTest> {
+/// were set free together with the active ones, and the standard error of the step. `scores` are [`SparseRows::scores`].
+pub fn score_tests(
+    equations: &NormalEquations,
+    scores: &SparseRows,
+    free: &[usize],
+    active: usize,
+) -> Vec<ScoreTest> {
     let prior = PriorTerms::new(equations, &free[..active]);
     let eliminated = match &equations.coupling {
-        Coupling::Dense(matrices) => eliminate_dense(equations, matrices, &prior, active),
-        Coupling::Sparse(rows) => eliminate_sparse(equations, rows, &prior, active),
+        Coupling::Dense(hessian) => {
+            eliminate_dense(equations, hessian, &scores.gram(), &prior, active)
+        }
+        Coupling::Sparse(slopes) => eliminate_sparse(equations, slopes, scores, &prior, active),
     };
     (eliminated.into_iter().zip(active..))
         .map(|((curvature, variance), row)| {
@@ -263,15 +282,15 @@ type Eliminated = (DVec3, DVec3);
 
 fn eliminate_dense(
     equations: &NormalEquations,
-    matrices: &Matrices,
+    hessian: &[DMatrix<f64>; 3],
+    scatter: &[DMatrix<f64>; 3],
     prior: &PriorTerms,
     active: usize,
 ) -> Vec<Eliminated> {
     let tested = equations.diagonal.len() - active;
-    let scatter = matrices.scatter();
     // The curvatures of all tested parameters, then their variances.
     let values = per_channel(|channel| {
-        let (hessian, scatter) = (&matrices.hessian[channel], &scatter[channel]);
+        let (hessian, scatter) = (&hessian[channel], &scatter[channel]);
         let Some(inverse) = inverse(hessian, &prior.added, channel) else {
             return vec![0.0; 2 * tested];
         };
@@ -300,11 +319,14 @@ fn eliminate_dense(
 /// As [`eliminate_dense`] for the parameters with the most significant scores; for the others nothing is eliminated.
 fn eliminate_sparse(
     equations: &NormalEquations,
-    rows: &Rows,
+    slopes: &SparseRows,
+    scores: &SparseRows,
     prior: &PriorTerms,
     active: usize,
 ) -> Vec<Eliminated> {
     let n = equations.diagonal.len();
+    let diagonal = &equations.diagonal;
+    let hessian = SparseHessian { slopes, diagonal };
     let mut tests: Vec<Eliminated> = (active..n)
         .map(|row| (equations.diagonal[row], equations.scatter[row]))
         .collect();
@@ -326,16 +348,16 @@ fn eliminate_sparse(
         .map(|&(_, row)| {
             let mut unit = vec![DVec3::ZERO; n];
             unit[row] = DVec3::ONE;
-            let coupling = rows.hessian_times(&unit);
+            let coupling = slopes.gram_times(&unit);
             // The direction along which the active parameters are optimal.
-            let mut direction = rows.solve(&added, &free, &coupling, &zero, DRAW_TOLERANCE);
+            let mut direction = hessian.solve(&added, &free, &coupling, &zero, DRAW_TOLERANCE);
             let explained = (0..active)
                 .map(|a| coupling[a] * direction[a])
                 .sum::<DVec3>();
             direction.iter_mut().for_each(|u| *u = -*u);
             direction[row] = DVec3::ONE;
             let curvature = equations.diagonal[row] - explained;
-            (row - active, (curvature, rows.scatter_along(&direction)))
+            (row - active, (curvature, scores.gram_along(&direction)))
         })
         .collect();
     for (index, test) in exact {
@@ -364,9 +386,10 @@ mod tests {
             let prior = Prior::new(1, 1, Vec3::ONE);
             let (even, free) = (RobustWeights::even(1), [1]);
             let equations = NormalEquations::new(&clusters, 1, &even, &prior);
-            let plain = standard_errors(&equations, &free, 1).emission[0].x;
-            let kept = jackknifed(equations, &clusters, &even, &free);
-            let error = standard_errors(&kept, &free, 1).emission[0].x;
+            let scores = SparseRows::scores(&clusters, 1, &even, |_| DVec3::ONE);
+            let plain = standard_errors(&equations, &scores, &free, 1).emission[0].x;
+            let kept = leave_one_out(&equations, &clusters, &even, &free);
+            let error = standard_errors(&equations, &kept, &free, 1).emission[0].x;
             let n = count as f32;
             assert!((plain - n.sqrt().recip()).abs() < 1e-4, "{plain}");
             assert!((error - n.sqrt() / (n - 1.0)).abs() < 1e-4, "{error}");
@@ -384,8 +407,10 @@ mod tests {
             })
             .collect();
         let prior = Prior::new(1, 1, Vec3::ONE);
-        let equations = NormalEquations::new(&clusters, 1, &RobustWeights::even(1), &prior);
-        let error = standard_errors(&equations, &[0], 1).albedo[0].x;
+        let even = RobustWeights::even(1);
+        let equations = NormalEquations::new(&clusters, 1, &even, &prior);
+        let scores = SparseRows::scores(&clusters, 1, &even, |_| DVec3::ONE);
+        let error = standard_errors(&equations, &scores, &[0], 1).albedo[0].x;
         assert!((error - ALBEDO_DEVIATION).abs() < 1e-4, "{error}");
     }
 }

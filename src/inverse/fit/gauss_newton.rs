@@ -1,13 +1,16 @@
 //! Finds the zero of the unbiased descent direction within bounds by Gauss–Newton steps.
 
-use crate::inverse::fit::equations::{Coupling, Matrices, NormalEquations, per_channel};
+use crate::inverse::fit::equations::{Coupling, NormalEquations, per_channel};
 use crate::inverse::fit::prior::Prior;
 use crate::inverse::fit::robust_weights::RobustWeights;
+use crate::inverse::fit::sparse_step::SparseHessian;
 use crate::inverse::fit::step::Step;
 use crate::inverse::paths::PathCache;
+use crate::inverse::paths::evaluate::Linearised;
+use crate::inverse::roles::places;
 use crate::inverse::unknowns::Unknowns;
 use glam::DVec3;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 /// Damping relative to the diagonal; only guards the factorisation against rounding.
 pub const MIN_DAMPING: f64 = 1e-10;
@@ -25,7 +28,9 @@ const ROUNDING: f64 = 4.0 * f32::EPSILON as f64 / STEP_TOLERANCE;
 pub struct Fit {
     /// The unknowns.
     pub unknowns: Unknowns,
-    /// The normal equations at the unknowns, over the free parameters.
+    /// The clusters linearised at the unknowns, with one row per free parameter.
+    pub clusters: Vec<Linearised>,
+    /// The normal equations of these.
     pub equations: NormalEquations,
     /// Number of steps taken.
     pub iterations: u64,
@@ -45,8 +50,14 @@ pub fn fit<E>(
     max_steps: u64,
     mut between: impl FnMut(&NormalEquations) -> Result<(), E>,
 ) -> Result<Fit, E> {
+    let row_of = places(free, start.surfaces());
+    let linearised = |unknowns: &Unknowns| {
+        let clusters = cache.linearise(unknowns, &row_of, &[]);
+        let equations = NormalEquations::new(&clusters, free.len(), robust, prior);
+        (clusters, equations)
+    };
     let mut unknowns = start.clone();
-    let mut equations = cache.normal_equations(&unknowns, free, robust, prior);
+    let (mut clusters, mut equations) = linearised(&unknowns);
     let mut iterations = 0;
     let mut damping = MIN_DAMPING;
     let mut before = f64::INFINITY;
@@ -56,7 +67,7 @@ pub fn fit<E>(
             break;
         }
         let (proposal, length) = propose(&equations, free, &unknowns, damping);
-        let after = cache.normal_equations(&proposal, free, robust, prior);
+        let (clusters_after, after) = linearised(&proposal);
         iterations += 1;
         between(&after)?;
         // Retry with more damping after an overshoot.
@@ -65,13 +76,14 @@ pub fn fit<E>(
             continue;
         }
         damping = (damping * 0.01).max(MIN_DAMPING);
-        (unknowns, equations, before) = (proposal, after, gradient);
+        (unknowns, clusters, equations, before) = (proposal, clusters_after, after, gradient);
         if length.step < STEP_TOLERANCE {
             break;
         }
     }
     Ok(Fit {
         unknowns,
+        clusters,
         equations,
         iterations,
     })
@@ -162,8 +174,12 @@ pub fn propose(
     };
     let upper: Vec<f64> = free.iter().map(|&i| upper(i, from)).collect();
     let step = match &equations.coupling {
-        Coupling::Dense(matrices) => dense_step(matrices, &x, &descent, &upper, damping, &added),
-        Coupling::Sparse(rows) => rows.bounded_step(&x, &descent, &added(damping), &upper),
+        Coupling::Dense(hessian) => dense_step(hessian, &x, &descent, &upper, damping, &added),
+        Coupling::Sparse(slopes) => {
+            let diagonal = &equations.diagonal;
+            let hessian = SparseHessian { slopes, diagonal };
+            hessian.bounded_step(&x, &descent, &added(damping), &upper)
+        }
     };
 
     let mut proposal = from.clone();
@@ -188,7 +204,7 @@ pub fn propose(
 
 /// The step of each channel, damped as far as needed to be solvable; zero if no damping helps.
 fn dense_step(
-    matrices: &Matrices,
+    hessian: &[DMatrix<f64>; 3],
     x: &[DVec3],
     descent: &[DVec3],
     upper: &[f64],
@@ -201,7 +217,7 @@ fn dense_step(
         let mut damping = damping;
         while damping < 1e9 {
             let step = Step {
-                hessian: &matrices.hessian[channel],
+                hessian: &hessian[channel],
                 descent: &descent,
                 damping: DVector::from_vec(of(&added(damping))),
                 upper,

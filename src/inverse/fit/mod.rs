@@ -9,6 +9,6 @@ pub mod model_error;
 pub mod path_noise;
 pub mod prior;
 pub mod robust_weights;
-pub mod rows;
 pub mod sparse_rows;
+pub mod sparse_step;
 pub mod step;

@@ -23,7 +23,7 @@ pub struct Linearised {
     pub censored: BVec3,
     /// Derivative with respect to the emission of a pure emitter, or else the object's albedo; mean of both sets.
     pub own: DVec3,
-    /// Index of a free parameter, derivative from set A, derivative from set B.
+    /// Index of a free parameter, derivative from set A, derivative from set B; by increasing index.
     pub rows: Vec<(usize, DVec3, DVec3)>,
 }
 
@@ -179,6 +179,7 @@ fn linearise(
             rows.push((row, scaled(a), scaled(b)));
         }
     }
+    rows.sort_unstable_by_key(|row| row.0);
     let object = cached.cluster.object as usize;
     let is_pure_emitter =
         unknowns.albedo[object] == Vec3::ZERO && unknowns.emission[object] != Vec3::ZERO;

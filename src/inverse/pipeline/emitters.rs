@@ -1,7 +1,7 @@
 //! Settles which objects emit light, by tests on stored paths, and sets the weights of light sampling.
 
 use crate::inverse::emitters::classify::classify;
-use crate::inverse::fit::errors::{ScoreTest, score_tests};
+use crate::inverse::fit::errors::ScoreTest;
 use crate::inverse::fit::gauss_newton::Fit;
 use crate::inverse::paths::PathCache;
 use crate::inverse::pipeline::fitting::role_under;
@@ -32,8 +32,7 @@ impl Pipeline<'_, '_> {
                 })
                 .map(|k| objects + k),
         );
-        let equations = cache.normal_equations(&self.unknowns, &free, &self.robust, &self.prior);
-        let tests = score_tests(&equations, &free, active);
+        let tests = self.score_tests(cache, &free, active);
         for test in &tests {
             self.errors.emission[test.index - objects] = test.stderr.as_vec3();
         }

@@ -1,13 +1,15 @@
 //! One fit of all free parameters to stored paths, and values that are known and held fixed through all fits.
 
-use crate::inverse::fit::errors::{StandardErrors, standard_errors};
+use crate::inverse::fit::equations::NormalEquations;
+use crate::inverse::fit::errors::{ScoreTest, StandardErrors, score_tests, standard_errors};
 use crate::inverse::fit::gauss_newton::{Fit, fit};
 use crate::inverse::fit::robust_weights::RobustWeights;
+use crate::inverse::fit::sparse_rows::SparseRows;
 use crate::inverse::known::Pinned;
 use crate::inverse::paths::PathCache;
 use crate::inverse::pipeline::{Pipeline, Result};
 use crate::inverse::roles::{self, Role};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 const MAX_STEPS: u64 = 30;
 /// Least area of an unseen surface whose albedo is fitted, as a fraction of the mesh's area. Smaller ones change the light in the
@@ -52,6 +54,21 @@ impl Pipeline<'_, '_> {
         Ok(fitted)
     }
 
+    /// Score tests of the parameters in `free` after the first `active` ones, at the present unknowns.
+    pub(super) fn score_tests(
+        &self,
+        cache: &PathCache,
+        free: &[usize],
+        active: usize,
+    ) -> Vec<ScoreTest> {
+        let row_of = roles::places(free, self.unknowns.surfaces());
+        let clusters = cache.linearise(&self.unknowns, &row_of, &[]);
+        let (n, robust) = (free.len(), &self.robust);
+        let equations = NormalEquations::new(&clusters, n, robust, &self.prior);
+        let scores = SparseRows::scores(&clusters, n, robust, |_| DVec3::ONE);
+        score_tests(&equations, &scores, free, active)
+    }
+
     /// Sets the robust weights and the model error from the residuals of the last fit, and fits again.
     pub(super) fn weigh(&mut self, cache: &PathCache) -> Result {
         let residuals = cache.residuals(&self.unknowns);
@@ -65,7 +82,8 @@ impl Pipeline<'_, '_> {
     /// Sets the unknowns and standard errors from a fit with the present roles.
     pub(super) fn take(&mut self, fitted: &Fit) {
         let free = self.free();
-        let errors = standard_errors(&fitted.equations, &free, self.roles.len());
+        let scores = SparseRows::scores(&fitted.clusters, free.len(), &self.robust, |_| DVec3::ONE);
+        let errors = standard_errors(&fitted.equations, &scores, &free, self.roles.len());
         self.merge_errors(errors);
         self.take_values(fitted);
     }

@@ -3,7 +3,7 @@
 use crate::inverse::emitters::lamp_albedo;
 use crate::inverse::estimate::{ENOUGH_PIXELS, relative_to_albedo};
 use crate::inverse::fit::accumulate::Accumulated;
-use crate::inverse::fit::errors::{StandardErrors, jackknifed, standard_errors};
+use crate::inverse::fit::errors::{StandardErrors, leave_one_out, standard_errors};
 use crate::inverse::fit::linear::{Descended, descend};
 use crate::inverse::fit::path_noise;
 use crate::inverse::paths::evaluate::Linearised;
@@ -194,13 +194,8 @@ impl Pipeline<'_, '_> {
         let free = roles::free(&self.roles, |k| self.has_free_albedo(k));
         let prior = lamp_albedo::without_lamps(&self.prior, &self.roles);
         let found = descend(clusters, about, &self.unknowns, &free, &prior);
-        let equations = jackknifed(
-            found.equations.clone(),
-            &found.clusters,
-            &found.robust,
-            &free,
-        );
-        let errors = standard_errors(&equations, &free, self.roles.len());
+        let scores = leave_one_out(&found.equations, &found.clusters, &found.robust, &free);
+        let errors = standard_errors(&found.equations, &scores, &free, self.roles.len());
         self.unknowns.clone_from(&found.unknowns);
         self.tell_model_error(&found.clusters);
         lamp_albedo::leave_out(&mut self.unknowns, &self.roles);

@@ -5,7 +5,7 @@
 //! best score tests are tried, each with its own paths and a refit of everything. The one with the smallest residuals is
 //! accepted, and the search is repeated until no candidate reduces the residuals significantly.
 
-use crate::inverse::fit::errors::{ScoreTest, score_tests};
+use crate::inverse::fit::errors::ScoreTest;
 use crate::inverse::fit::gauss_newton::Fit;
 use crate::inverse::fit::robust_weights::RobustWeights;
 use crate::inverse::paths::PathCache;
@@ -121,9 +121,7 @@ impl Pipeline<'_, '_> {
         for mut free in at_first.then_some(light).into_iter().chain([all]) {
             let active = free.len();
             free.extend(candidates.iter().map(|k| surfaces + k));
-            let equations =
-                explored.normal_equations(&self.unknowns, &free, &self.robust, &self.prior);
-            let mut tests: Vec<ScoreTest> = (score_tests(&equations, &free, active).into_iter())
+            let mut tests: Vec<ScoreTest> = (self.score_tests(explored, &free, active).into_iter())
                 .filter(|test| test.significance() > SIGNIFICANT)
                 .collect();
             tests.sort_by(|a, b| b.gain().total_cmp(&a.gain()).then(a.index.cmp(&b.index)));

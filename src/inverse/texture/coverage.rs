@@ -9,6 +9,8 @@ use rayon::prelude::*;
 /// What the pixels see of the cells.
 #[derive(Debug, Clone)]
 pub struct Coverage {
+    /// Pixels that see the side of the cells whose irradiance is traced.
+    pub pixels: Vec<SeenPixel>,
     /// For each pixel in the fit, the cells that it sees and the fraction of its rays on each.
     pub observations: Observations,
     /// Area of each cell below the rays of the pixels in the fit, at most all of it, in square metres.
@@ -21,7 +23,7 @@ pub struct Coverage {
 
 impl Coverage {
     /// Locates the hits of all pixels. Cells have one side, whose irradiance is traced: pixels that see the other side are removed.
-    pub fn new(cells: &Cells, pixels: &mut Vec<SeenPixel>) -> Self {
+    pub fn new(cells: &Cells, mut pixels: Vec<SeenPixel>) -> Self {
         let located: Vec<Option<Vec<u32>>> = (pixels.par_iter())
             .map(|pixel| pixel.hits.iter().map(|hit| cells.facing(hit)).collect())
             .collect();
@@ -42,6 +44,7 @@ impl Coverage {
         let rows: Vec<Vec<(u32, f32)>> = fitted().map(|(_, located)| row(located)).collect();
         let (ends, hits) = by_cell(&located, cells.count());
         Self {
+            pixels,
             observations: Observations::new(&rows, cells.count()),
             areas,
             ends,
@@ -54,10 +57,10 @@ impl Coverage {
         row_range(&self.ends, cell).len()
     }
 
-    /// A hit on a cell; `pixels` are those that were located.
-    pub fn hit(&self, pixels: &[SeenPixel], cell: usize, index: usize) -> Hit {
+    /// A hit on a cell.
+    pub fn hit(&self, cell: usize, index: usize) -> Hit {
         let hit = self.hits[row_range(&self.ends, cell)][index];
-        pixels[(hit / RAYS) as usize].hits[(hit % RAYS) as usize].hit
+        self.pixels[(hit / RAYS) as usize].hits[(hit % RAYS) as usize].hit
     }
 }
 

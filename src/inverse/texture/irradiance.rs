@@ -5,7 +5,6 @@ use crate::inverse::texture::coverage::Coverage;
 use crate::inverse::texture::fuse::{Problem, fuse, mean, mean_channel};
 use crate::inverse::texture::gloss::white_base;
 use crate::inverse::texture::links::Links;
-use crate::inverse::texture::look::SeenPixel;
 use crate::inverse::texture::observations::Observations;
 use crate::math::color::luminance;
 use crate::math::rng::Stream;
@@ -41,9 +40,6 @@ pub struct Irradiance {
     pub cast: RayCount,
 }
 
-/// Where pixels see the cells, and these pixels.
-pub type Seen<'a> = (&'a Coverage, &'a [SeenPixel]);
-
 /// Smoothed irradiance.
 #[derive(Debug, Clone)]
 pub struct Smoothed {
@@ -58,7 +54,7 @@ pub struct Smoothed {
 pub fn trace(
     lit: &LitScene,
     cells: &Cells,
-    seen: Seen,
+    coverage: &Coverage,
     range: Range<usize>,
     samples: u32,
     options: &PathOptions,
@@ -73,7 +69,7 @@ pub fn trace(
                 for sample in 0..samples {
                     let index = KEY + 2 * u64::from(sample) + set;
                     let mut stream = Stream::new(seed, key, cell as u64, index);
-                    let (hit, normal) = point_on(lit, cells, seen, cell, &mut stream);
+                    let (hit, normal) = point_on(lit, cells, coverage, cell, &mut stream);
                     let surface = lit.surface(&hit);
                     let (light, path) = white_base(lit, &surface, normal, &mut stream, options);
                     sum += light.as_dvec3();
@@ -98,7 +94,7 @@ pub fn trace(
 fn point_on(
     lit: &LitScene,
     cells: &Cells,
-    seen: Seen,
+    coverage: &Coverage,
     cell: usize,
     stream: &mut Stream,
 ) -> (Hit, Vec3) {
@@ -110,11 +106,10 @@ fn point_on(
         let front = cells.front(hit.triangle).unwrap_or(true);
         (hit, if front { normal } else { -normal })
     };
-    let (coverage, pixels) = seen;
     let count = coverage.count(cell);
     if count > 0 {
         let index = (choice * count as f32) as usize;
-        return oriented(coverage.hit(pixels, cell, index.min(count - 1)));
+        return oriented(coverage.hit(cell, index.min(count - 1)));
     }
     let cell = &cells.cells[cell];
     let piece = match cell.pieces.as_slice() {

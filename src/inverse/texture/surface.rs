@@ -37,7 +37,6 @@ pub struct TexturedSurface {
     /// Whether it has a lobe.
     glossy: bool,
     seed: u64,
-    pixels: Vec<SeenPixel>,
     /// Its cells.
     pub cells: Cells,
     /// The graph of neighbouring cells.
@@ -79,7 +78,7 @@ impl TexturedSurface {
 
     /// The same object in cells of another width.
     pub fn recut(&self, scene: &Scene, width: f32) -> Option<Self> {
-        let pixels = self.pixels.clone();
+        let pixels = self.coverage.pixels.clone();
         Self::cut(scene, self.object, self.glossy, pixels, self.seed, width)
     }
 
@@ -87,13 +86,13 @@ impl TexturedSurface {
         scene: &Scene,
         object: usize,
         glossy: bool,
-        mut pixels: Vec<SeenPixel>,
+        pixels: Vec<SeenPixel>,
         seed: u64,
         width: f32,
     ) -> Option<Self> {
         let cells = Cells::new(scene, &pixels, width);
-        let coverage = Coverage::new(&cells, &mut pixels);
-        if pixels.iter().all(|p| p.held_out || p.saturated) {
+        let coverage = Coverage::new(&cells, pixels);
+        if coverage.pixels.iter().all(|p| p.held_out || p.saturated) {
             return None;
         }
         let links = Links::new(scene, &cells);
@@ -111,7 +110,6 @@ impl TexturedSurface {
             },
             constant: Vec3::ZERO,
             stderr: Vec::new(),
-            pixels,
             cells,
             links,
         })
@@ -136,7 +134,7 @@ impl TexturedSurface {
             let part = trace(
                 lit,
                 &self.cells,
-                (&self.coverage, &self.pixels),
+                &self.coverage,
                 range,
                 samples,
                 options,
@@ -148,14 +146,19 @@ impl TexturedSurface {
         let light = irradiance.smoothed(&self.links, || done(Step::default()))?;
         done(Step::default())?;
         if self.glossy {
-            let samples = paths / (GLOSS_COST * self.pixels.len() as u64);
+            let samples = paths / (GLOSS_COST * self.coverage.pixels.len() as u64);
             let samples = samples.clamp(MIN_GLOSS, MAX_SAMPLES) as u32;
-            for pixels in self.pixels.chunks_mut(SLICE) {
+            for pixels in self.coverage.pixels.chunks_mut(SLICE) {
                 let cast = trace_gloss(lit, pixels, samples, options, self.seed, key);
                 done(Step::cast(cast))?;
             }
         }
-        let fitted: Vec<&SeenPixel> = self.pixels.iter().filter(|p| !p.held_out).collect();
+        let fitted: Vec<&SeenPixel> = self
+            .coverage
+            .pixels
+            .iter()
+            .filter(|p| !p.held_out)
+            .collect();
         let mut measurements =
             Measurements::new(&fitted, &self.coverage.observations, &light.radiance);
         // A highlight is wrong in a whole photograph: whether a glossy object has a texture at all, all folds decide.
@@ -192,7 +195,7 @@ impl TexturedSurface {
         // Held-out pixels; if they are few, also each fold with the texture fitted without it. Glossy objects are tested by
         // folds alone, which are whole photographs.
         let colors = self.texture.colors.as_slice();
-        let unsaturated = || self.pixels.iter().filter(|p| !p.saturated);
+        let unsaturated = || self.coverage.pixels.iter().filter(|p| !p.saturated);
         let held_out = unsaturated().filter(|p| p.held_out && !self.glossy);
         let mut pixels: Vec<TestPixel> =
             held_out.map(|pixel| TestPixel { pixel, colors }).collect();
@@ -228,7 +231,7 @@ impl TexturedSurface {
 
     /// Number of pixels in the fit.
     pub fn pixel_count(&self) -> usize {
-        self.pixels.iter().filter(|p| !p.held_out).count()
+        self.coverage.pixels.iter().filter(|p| !p.held_out).count()
     }
 
     /// Mean albedo over the area that pixels see.

@@ -1,13 +1,9 @@
-//! Normal equations as the clusters' sparse rows, for too many unknowns for dense matrices: the paths of a cluster meet few of
-//! the surfaces. Solved by conjugate gradients, for the three channels in parallel.
+//! Steps of the fit with a Hessian of sparse rows, for too many unknowns for dense matrices: the paths of a cluster meet few of the
+//! surfaces. Solved by conjugate gradients, for the three channels in parallel.
 
-use crate::inverse::fit::robust_weights::RobustWeights;
-use crate::inverse::paths::evaluate::Linearised;
-use glam::{DVec3, Vec3};
-use rayon::prelude::*;
+use crate::inverse::fit::sparse_rows::SparseRows;
+use glam::DVec3;
 
-/// Number of partial sums over clusters; fixed, for the same bits on any number of threads.
-const PARTS: usize = 8;
 /// Greatest number of conjugate gradient iterations.
 const MAX_ITERATIONS: usize = 200;
 /// Relative residual at which conjugate gradients stop.
@@ -15,123 +11,16 @@ const TOLERANCE: f64 = 3e-6;
 /// Greatest number of changes of the active set of bounds.
 const MAX_ACTIVE_SETS: usize = 24;
 
-/// A non-zero entry of a cluster's row; in f32, since memory bandwidth is the bottleneck.
+/// The Hessian H as sparse rows.
 #[derive(Debug, Clone, Copy)]
-struct Entry {
-    parameter: u32,
-    value: Vec3,
+pub struct SparseHessian<'a> {
+    /// [`SparseRows::slopes`].
+    pub slopes: &'a SparseRows,
+    /// Its diagonal.
+    pub diagonal: &'a [DVec3],
 }
 
-/// The rows of all clusters.
-#[derive(Debug, Clone)]
-pub struct Rows {
-    /// √w J̄ with J̄ the mean derivative of both sets.
-    slopes: Vec<Entry>,
-    /// Contributions to the descent direction.
-    scores: Vec<Entry>,
-    /// End of each cluster in both.
-    ends: Vec<usize>,
-    /// Σ w J̄² of each parameter.
-    pub diagonal: Vec<DVec3>,
-}
-
-impl Rows {
-    /// From linearised clusters with `n` free parameters.
-    pub fn new(linearised: &[Linearised], n: usize, robust: &RobustWeights) -> Self {
-        let parts: Vec<Self> = (linearised.par_chunks(linearised.len().div_ceil(PARTS).max(1)))
-            .map(|clusters| Self::part(clusters, n, robust))
-            .collect();
-        let mut all = Self::part(&[], n, robust);
-        for part in parts {
-            let before = all.slopes.len();
-            all.slopes.extend(part.slopes);
-            all.scores.extend(part.scores);
-            all.ends.extend(part.ends.iter().map(|end| before + end));
-            for (sum, more) in all.diagonal.iter_mut().zip(part.diagonal) {
-                *sum += more;
-            }
-        }
-        all
-    }
-
-    fn part(clusters: &[Linearised], n: usize, robust: &RobustWeights) -> Self {
-        let mut this = Self {
-            slopes: Vec::new(),
-            scores: Vec::new(),
-            ends: Vec::with_capacity(clusters.len()),
-            diagonal: vec![DVec3::ZERO; n],
-        };
-        for cluster in clusters {
-            let weight = robust.weight(cluster);
-            let root = weight.powf(0.5);
-            for (&(parameter, a, b), score) in cluster.rows.iter().zip(cluster.scores(weight)) {
-                let slope = root * (a + b) * 0.5;
-                this.diagonal[parameter] += slope * slope;
-                let entry = |value: DVec3| Entry {
-                    parameter: parameter as u32,
-                    value: value.as_vec3(),
-                };
-                this.slopes.push(entry(slope));
-                this.scores.push(entry(score));
-            }
-            this.ends.push(this.slopes.len());
-        }
-        this
-    }
-
-    /// Σ f e over the entries e of all clusters, with a factor f of each cluster, from its index and entries.
-    fn sum(
-        &self,
-        entries: &[Entry],
-        factor: impl Fn(usize, &[Entry]) -> DVec3 + Sync,
-    ) -> Vec<DVec3> {
-        let clusters = self.ends.len();
-        let parts: Vec<Vec<DVec3>> = (0..PARTS)
-            .into_par_iter()
-            .map(|part| {
-                let mut sum = vec![DVec3::ZERO; self.diagonal.len()];
-                for cluster in part * clusters / PARTS..(part + 1) * clusters / PARTS {
-                    let start = cluster.checked_sub(1).map_or(0, |before| self.ends[before]);
-                    let own = &entries[start..self.ends[cluster]];
-                    let factor = factor(cluster, own);
-                    for entry in own {
-                        sum[entry.parameter as usize] += entry.value.as_dvec3() * factor;
-                    }
-                }
-                sum
-            })
-            .collect();
-        let mut total = vec![DVec3::ZERO; self.diagonal.len()];
-        for part in parts {
-            for (sum, more) in total.iter_mut().zip(part) {
-                *sum += more;
-            }
-        }
-        total
-    }
-
-    /// H v with H = Σ w J̄ J̄ᵀ.
-    pub fn hessian_times(&self, v: &[DVec3]) -> Vec<DVec3> {
-        self.sum(&self.slopes, |_, own| dot(own, v))
-    }
-
-    /// Σ f g with a cluster's contribution g to the descent direction and its factor f.
-    pub fn scores_times(&self, factor: impl Fn(usize) -> DVec3 + Sync) -> Vec<DVec3> {
-        self.sum(&self.scores, |cluster, _| factor(cluster))
-    }
-
-    /// vᵀ S v with S = Σ g gᵀ.
-    pub fn scatter_along(&self, v: &[DVec3]) -> DVec3 {
-        let mut start = 0;
-        let mut sum = DVec3::ZERO;
-        for &end in &self.ends {
-            let score = dot(&self.scores[start..end], v);
-            sum += score * score;
-            start = end;
-        }
-        sum
-    }
-
+impl SparseHessian<'_> {
     /// Solves (H + D) x = b by preconditioned conjugate gradients from `start`, with D = `added` and b = `right`, over the entries
     /// where `free` is one; the others are zero.
     pub fn solve(
@@ -155,7 +44,7 @@ impl Rows {
         };
         let goal = dot(&residual, &scaled(&residual)) * (tolerance * tolerance);
         if x.iter().any(|x| *x != DVec3::ZERO) {
-            let product = self.hessian_times(&x);
+            let product = self.slopes.gram_times(&x);
             for i in 0..n {
                 residual[i] -= (product[i] + added[i] * x[i]) * free[i];
             }
@@ -167,7 +56,7 @@ impl Rows {
             if !rz.cmpgt(goal).any() {
                 break;
             }
-            let mut product = self.hessian_times(&direction);
+            let mut product = self.slopes.gram_times(&direction);
             for i in 0..n {
                 product[i] = (product[i] + added[i] * direction[i]) * free[i];
             }
@@ -203,13 +92,13 @@ impl Rows {
         let mut step = held.clone();
         for _ in 0..MAX_ACTIVE_SETS {
             // Solve for the free parameters, with the others at their bounds.
-            let from_held = self.hessian_times(&held);
+            let from_held = self.slopes.gram_times(&held);
             let right: Vec<DVec3> = (0..n).map(|i| descent[i] - from_held[i]).collect();
             step = self.solve(added, &free, &right, &step, TOLERANCE);
             for i in 0..n {
                 step[i] += held[i];
             }
-            let product = self.hessian_times(&step);
+            let product = self.slopes.gram_times(&step);
 
             // Hold parameters that left their bounds, and free those whose gradient points inwards.
             let mut changed = false;
@@ -238,22 +127,19 @@ impl Rows {
     }
 }
 
-/// Dot product of a sparse row with a vector.
-fn dot(entries: &[Entry], v: &[DVec3]) -> DVec3 {
-    (entries.iter())
-        .map(|e| e.value.as_dvec3() * v[e.parameter as usize])
-        .sum()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inverse::fit::equations::{Coupling, Matrices, NormalEquations};
+    use crate::inverse::fit::equations::NormalEquations;
     use crate::inverse::fit::errors::{score_tests, standard_errors};
     use crate::inverse::fit::gauss_newton::propose;
     use crate::inverse::fit::prior::Prior;
+    use crate::inverse::fit::robust_weights::RobustWeights;
+    use crate::inverse::paths::evaluate::Linearised;
     use crate::inverse::unknowns::Unknowns;
     use crate::math::rng::Stream;
+    use glam::Vec3;
+
     const SURFACES: usize = 40;
     /// All albedos and the first ten emissions.
     const FREE: usize = SURFACES + 10;
@@ -277,6 +163,7 @@ mod tests {
                 }
                 let pull = if object.is_multiple_of(3) { -1.5 } else { 0.4 };
                 let residual = rows[0].1 * pull + color(0.3);
+                rows.sort_unstable_by_key(|row| row.0);
                 Linearised {
                     weight: DVec3::ONE + color(1.0),
                     residuals: [residual, residual + color(0.05)],
@@ -287,24 +174,23 @@ mod tests {
             .collect()
     }
 
-    fn both() -> [NormalEquations; 2] {
-        let linearised = clusters();
-        let (even, prior) = (
-            RobustWeights::even(SURFACES),
-            Prior::new(SURFACES, SURFACES, Vec3::ONE),
-        );
-        [
-            Coupling::Dense(Matrices::new(&linearised, FREE, &even)),
-            Coupling::Sparse(Rows::new(&linearised, FREE, &even)),
-        ]
-        .map(|c| NormalEquations::with_coupling(&linearised, FREE, &even, &prior, c))
+    /// The equations with matrices and with sparse rows, and the clusters' scores.
+    fn both() -> ([NormalEquations; 2], SparseRows) {
+        let clusters = clusters();
+        let even = RobustWeights::even(SURFACES);
+        let prior = Prior::new(SURFACES, SURFACES, Vec3::ONE);
+        let equations = [FREE, 0].map(|max_dense| {
+            NormalEquations::with_at_most(max_dense, &clusters, FREE, &even, &prior)
+        });
+        let scores = SparseRows::scores(&clusters, FREE, &even, |_| DVec3::ONE);
+        (equations, scores)
     }
 
     #[test]
     fn rows_take_the_same_bounded_step_as_matrices() {
         let free: Vec<usize> = (0..FREE).collect();
         let from = Unknowns::new(SURFACES);
-        let [dense, sparse] = both().map(|e| propose(&e, &free, &from, 1e-10).0);
+        let [dense, sparse] = both().0.map(|e| propose(&e, &free, &from, 1e-10).0);
         let mut at_bounds = 0;
         for &i in &free {
             assert!((dense.value(i) - sparse.value(i)).length() < 1e-5, "{i}");
@@ -316,7 +202,8 @@ mod tests {
     #[test]
     fn drawn_standard_errors_are_those_of_matrices() {
         let free: Vec<usize> = (0..FREE).collect();
-        let [dense, sparse] = both().map(|e| standard_errors(&e, &free, SURFACES));
+        let (equations, scores) = both();
+        let [dense, sparse] = equations.map(|e| standard_errors(&e, &scores, &free, SURFACES));
         let ratios: Vec<f64> = (dense.albedo.iter().zip(&sparse.albedo))
             .flat_map(|(a, b)| (*b / *a).to_array())
             .map(f64::from)
@@ -330,7 +217,8 @@ mod tests {
     #[test]
     fn what_is_released_is_tested_alike() {
         let free: Vec<usize> = (0..FREE).collect();
-        let [dense, sparse] = both().map(|e| score_tests(&e, &free, SURFACES));
+        let (equations, scores) = both();
+        let [dense, sparse] = equations.map(|e| score_tests(&e, &scores, &free, SURFACES));
         for (a, b) in dense.iter().zip(&sparse) {
             for c in 0..3 {
                 for ratio in [a.step[c] / b.step[c], a.stderr[c] / b.stderr[c]] {
