@@ -127,9 +127,11 @@ fn insertions(arguments: &StudyArguments, rooms: u32, family: &str) -> Result<()
         }
         say::note(format_args!("{} room {seed} …", family.name()));
         match composite(family, seed, &plan)? {
-            Some(row) => {
+            Some((row, pictures)) => {
                 say::note(row.words());
                 rows.append(row)?;
+                let name = format!("insertion-{}-{seed}.png", family.name());
+                pictures.write(&arguments.out.join(name))?;
             }
             None => say::note("  no free place on its floor that photographs see"),
         }

@@ -1,5 +1,5 @@
 //! The documentation against the program: chapters made from it are as it makes them, the summary lists every chapter, links
-//! lead somewhere, commands are lines that it takes, and the example of a capture can be read.
+//! lead somewhere, source files that it names exist, commands are lines that it takes, and the example of a capture can be read.
 //!
 //! `RELIT_WRITE_DOCS=1 cargo test --test docs` writes the made parts anew.
 
@@ -204,6 +204,40 @@ fn every_link_and_every_picture_leads_somewhere() {
         }
     }
     assert!(broken.is_empty(), "{broken:#?}");
+}
+
+/// All files below a folder.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).expect("the source is there");
+    let paths = entries.map(|entry| entry.expect("the source is there").path());
+    let all = paths.flat_map(|path| match path.is_dir() {
+        true => files(&path),
+        false => vec![path],
+    });
+    all.collect()
+}
+
+#[test]
+fn every_source_file_that_is_named_exists() {
+    let sources: Vec<PathBuf> = (["src", "tests", "benches", "fuzz"].iter())
+        .flat_map(|folder| files(&root().join(folder)))
+        .collect();
+    let (mut missing, mut named) = (Vec::new(), 0);
+    for page in pages() {
+        let own = text(&page);
+        // NAME stands for any.
+        let names = (own.split('`').skip(1).step_by(2))
+            .filter(|name| name.ends_with(".rs") && !name.contains([' ', '*', '{']))
+            .filter(|name| !name.contains("NAME"));
+        for name in names {
+            named += 1;
+            if !sources.iter().any(|path| path.ends_with(name)) {
+                missing.push(format!("{}: {name}", page.display()));
+            }
+        }
+    }
+    assert!(named > 20, "only {named} names were found");
+    assert!(missing.is_empty(), "{missing:#?}");
 }
 
 #[test]

@@ -17,6 +17,7 @@ mod links;
 mod look;
 mod normal_matrix;
 mod observations;
+mod part;
 mod surface;
 mod trial;
 mod whole;
@@ -30,6 +31,7 @@ use crate::inverse::solver::Termination;
 use crate::transport::arrival::RayCount;
 use crate::transport::path::PathOptions;
 use glam::Vec3;
+use part::part_of;
 use std::sync::Arc;
 use surface::TexturedSurface;
 pub use trial::Trial;
@@ -40,13 +42,15 @@ const SIGNIFICANT: f64 = 4.0;
 const MIN_PIXELS: usize = 60;
 /// Least number of held-out pixels of an object.
 const MIN_HELD_OUT: usize = 10;
-/// Fraction of the paths for the first, coarse fit.
+/// Fraction of the paths for coarse fits.
 const COARSE_PATHS: f64 = 0.4;
-/// Width of its cells, relative to the finest ones.
+/// Number of an object's pixels that suffices for coarse fits: with a twentieth held out, a trial compares 1,000.
+const COARSE_PIXELS: usize = 20_000;
+/// Width of the cells of coarse fits, relative to the finest ones.
 const COARSE_WIDTH: f32 = 2.0;
 /// Held-out loss, relative to the best one, above which a state is rejected.
 const MAX_LOSS_RATIO: f64 = 1.02;
-/// Number of alternations between light and textures.
+/// Number of alternations between light and textures, the last one with fine cells.
 const SWEEPS: u32 = 2;
 
 /// The inputs of the stage.
@@ -212,12 +216,13 @@ pub fn refine(
         kept: Vec::new(),
         change: 0.0,
     };
-    let mut ended = refinement.fit_coarse(&candidates(task, objects), report);
+    let candidates = candidates(task, objects);
+    let mut ended = refinement.fit_coarse(&candidates, report);
     let mut states = vec![refinement.refined()];
     for sweep in 1..=SWEEPS {
         let texels = states.last().and_then(|state| state.texels.clone());
         if let (Ok(()), Some(texels)) = (&ended, texels) {
-            ended = refinement.sweep(sweep, texels, report);
+            ended = refinement.sweep(sweep, &candidates, texels, report);
             states.push(refinement.refined());
         }
     }
@@ -271,7 +276,7 @@ impl Refinement<'_> {
     /// Fits each candidate in coarse cells, and keeps those whose texture is significant.
     fn fit_coarse(
         &mut self,
-        candidates: &[(usize, Vec<&GBufferPixel>)],
+        candidates: &[Candidate],
         report: &mut Report,
     ) -> Result<(), Termination> {
         let lit = self.estimate.lit(&self.task.problem.scene);
@@ -283,8 +288,9 @@ impl Refinement<'_> {
             let mut done = |step| report(step, fraction);
             done(Step::default())?;
             let glossy = self.estimate.objects[*object].lobe().is_some();
+            let part = part_of(pixels, COARSE_PIXELS);
             let Some(mut coarse) =
-                TexturedSurface::new(self.task, *object, glossy, pixels, COARSE_WIDTH)
+                TexturedSurface::new(self.task, *object, glossy, &part, COARSE_WIDTH)
             else {
                 continue;
             };
@@ -309,10 +315,11 @@ impl Refinement<'_> {
         Ok(())
     }
 
-    /// Traces the light again with the textures `texels`, and fits the textures to it; in fine cells from the first sweep on.
+    /// Traces the light again with the textures `texels`, and fits the textures to it; in fine cells in the last sweep.
     fn sweep(
         &mut self,
         sweep: u32,
+        candidates: &[Candidate],
         texels: Arc<TexelEstimate>,
         report: &mut Report,
     ) -> Result<(), Termination> {
@@ -321,21 +328,27 @@ impl Refinement<'_> {
             ..self.estimate.clone()
         };
         let lit = textured.lit(&self.task.problem.scene);
+        let last = sweep == SWEEPS;
         let count = self.kept.len();
         let total: f64 = (self.kept.iter())
             .map(|s| (s.pixel_count() as f64).sqrt())
             .sum();
         self.change = 0.0;
         for (index, surface) in self.kept.iter_mut().enumerate() {
-            let paths = self.task.paths as f64 * (surface.pixel_count() as f64).sqrt() / total;
+            let share = (surface.pixel_count() as f64).sqrt() / total;
+            let paths = self.task.paths as f64 * share * if last { 1.0 } else { COARSE_PATHS };
             let fraction = (f64::from(sweep - 1) + index as f64 / count as f64) / f64::from(SWEEPS);
             let mut done = |step| report(step, 0.6 + 0.4 * fraction);
             let before = surface.mean();
             let known = &self.estimate.objects[surface.object];
             let scale_error = known.albedo_stderr / known.albedo.max(Vec3::splat(1e-3));
-            let errors = (sweep == SWEEPS).then_some(scale_error);
-            if sweep == 1 {
-                let Some(mut fine) = surface.recut(&self.task.problem.scene, 1.0) else {
+            let errors = last.then_some(scale_error);
+            if last {
+                let own = candidates.iter().find(|c| c.0 == surface.object);
+                let fine = own.and_then(|(object, pixels)| {
+                    TexturedSurface::new(self.task, *object, surface.glossy, pixels, 1.0)
+                });
+                let Some(mut fine) = fine else {
                     continue;
                 };
                 fine.find(&lit, &self.options, paths as u64, sweep, errors, &mut done)?;
@@ -368,14 +381,16 @@ impl Refinement<'_> {
     }
 }
 
-/// Those of the given objects that enough pixels see, with their pure pixels.
-fn candidates<'a>(task: &Task<'a>, objects: &[usize]) -> Vec<(usize, Vec<&'a GBufferPixel>)> {
+/// An object, and its pixels that see nothing else.
+type Candidate<'a> = (usize, Vec<&'a GBufferPixel>);
+
+/// Those of the given objects that enough pixels see.
+fn candidates<'a>(task: &Task<'a>, objects: &[usize]) -> Vec<Candidate<'a>> {
     let mut index_of = vec![None; task.problem.scene.objects.len()];
     for (index, &object) in objects.iter().enumerate() {
         index_of[object] = Some(index);
     }
-    let mut pixels: Vec<(usize, Vec<&GBufferPixel>)> =
-        objects.iter().map(|&o| (o, Vec::new())).collect();
+    let mut pixels: Vec<Candidate> = objects.iter().map(|&o| (o, Vec::new())).collect();
     for pixel in task.gbuffer.pixels.iter().filter(|p| p.pure) {
         if let Some(&Some(index)) = index_of.get(pixel.object as usize) {
             pixels[index].1.push(pixel);

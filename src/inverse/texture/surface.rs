@@ -12,7 +12,6 @@ use crate::inverse::texture::links::Links;
 use crate::inverse::texture::look::{FOLDS, RAYS, SeenPixel, sample_pixels};
 use crate::inverse::texture::trial::{TestPixel, Trial, compare};
 use crate::inverse::texture::{Step, Task};
-use crate::scene::Scene;
 use crate::transport::lit::LitScene;
 use crate::transport::path::PathOptions;
 use glam::{DVec3, Vec3};
@@ -35,7 +34,7 @@ pub struct TexturedSurface {
     /// Object index.
     pub object: usize,
     /// Whether it has a lobe.
-    glossy: bool,
+    pub glossy: bool,
     seed: u64,
     /// Its cells.
     pub cells: Cells,
@@ -64,7 +63,7 @@ impl TexturedSurface {
         pixels: &[&GBufferPixel],
         width: f32,
     ) -> Option<Self> {
-        let seed = task.settings.seed;
+        let (scene, seed) = (&task.problem.scene, task.settings.seed);
         let pixels = sample_pixels(
             task.problem,
             object as u32,
@@ -73,23 +72,6 @@ impl TexturedSurface {
             glossy,
             seed,
         );
-        Self::cut(&task.problem.scene, object, glossy, pixels, seed, width)
-    }
-
-    /// The same object in cells of another width.
-    pub fn recut(&self, scene: &Scene, width: f32) -> Option<Self> {
-        let pixels = self.coverage.pixels.clone();
-        Self::cut(scene, self.object, self.glossy, pixels, self.seed, width)
-    }
-
-    fn cut(
-        scene: &Scene,
-        object: usize,
-        glossy: bool,
-        pixels: Vec<SeenPixel>,
-        seed: u64,
-        width: f32,
-    ) -> Option<Self> {
         let cells = Cells::new(scene, &pixels, width);
         let coverage = Coverage::new(&cells, pixels);
         if coverage.pixels.iter().all(|p| p.held_out || p.saturated) {

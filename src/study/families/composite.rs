@@ -12,7 +12,7 @@ use crate::math::picture::Picture;
 use crate::math::stats::quantile;
 use crate::room::generated::Family;
 use crate::scene::Scene;
-use crate::study::experiments::{Cylinder, chair_model, insert, places, up, upright};
+use crate::study::experiments::{Cylinder, Grid, chair_model, insert, places, up, upright};
 use crate::study::families::Plan;
 use crate::study::families::row::{RoomRow, Solve};
 use crate::study::families::score::{Solved, solved};
@@ -36,10 +36,11 @@ const FRAMES: usize = 2;
 /// Range of the fraction of a photograph that it covers.
 const COVERED: [f64; 2] = [0.005, 0.3];
 /// Samples per pixel of the composite and of the truth, both in two halves and denoised.
-const SAMPLES: [u32; 2] = [64, 256];
+const SAMPLES: [u32; 2] = [64, 64];
 /// Shadow and bleed are the pixels beside the chair that it changes by more than this, at the photograph's exposure.
 const CHANGED: f32 = 0.025;
-
+/// Captions of the pictures of a photograph.
+const TITLES: [&str; 4] = ["truth", "relit", "naive", "photograph"];
 /// Greatest power of the cosine by which the photographs of generated rooms are dimmed off the axis, with a margin.
 const MAX_POWER: u32 = 6;
 
@@ -78,11 +79,12 @@ pub struct CompositeRow {
     pub slope: Option<f64>,
 }
 
-/// Generates and solves a room, and inserts a chair into the photographs that see most of it. `None` without a visible free place.
+/// Generates and solves a room, and inserts a chair into the photographs that see most of it. The pictures are the truth, ours, the
+/// naive composite and the photograph. `None` without a visible free place.
 ///
 /// # Errors
 /// The room cannot be generated or solved.
-pub fn composite(family: Family, seed: u64, plan: &Plan) -> Result<Option<CompositeRow>> {
+pub fn composite(family: Family, seed: u64, plan: &Plan) -> Result<Option<(CompositeRow, Grid)>> {
     let solved = solved(family, seed, plan)?;
     let truth = Arc::new(solved.room.lit.clone());
     let Some(chair) = standing(&truth)? else {
@@ -90,9 +92,15 @@ pub fn composite(family: Family, seed: u64, plan: &Plan) -> Result<Option<Compos
     };
     let true_chair = [placed(&chair, &truth.scene)?];
     let frames = most_seen(&truth, &true_chair);
-    let scores = (frames.iter())
-        .map(|&frame| scores(&solved, frame, &truth, &true_chair, &chair))
-        .collect::<Result<Vec<_>>>()?;
+    let (mut scores, mut pictures) = (Vec::new(), Vec::new());
+    for frame in frames {
+        let (of_frame, shown) = compare(&solved, frame, &truth, &true_chair, &chair)?;
+        scores.push(of_frame);
+        pictures.extend(TITLES.map(str::to_owned).into_iter().zip(shown));
+    }
+    if scores.is_empty() {
+        return Ok(None);
+    }
     let count = scores.len() as f64;
     let mean = |score: fn(&Scores) -> f64| scores.iter().map(score).sum::<f64>() / count;
     let changed: Vec<[f64; 4]> = scores.iter().filter_map(|s| s.around).collect();
@@ -100,7 +108,7 @@ pub fn composite(family: Family, seed: u64, plan: &Plan) -> Result<Option<Compos
         [0, 1, 2, 3].map(|score| changed.iter().map(|around| around[score]).sum::<f64>());
     let frames = changed.len() as f64;
     let around = |mean: f64| (!changed.is_empty()).then_some(mean);
-    Ok((!scores.is_empty()).then(|| CompositeRow {
+    let row = CompositeRow {
         relit: env!("CARGO_PKG_VERSION").to_owned(),
         preset: plan.preset.word().to_owned(),
         width: plan.size[0],
@@ -114,7 +122,13 @@ pub fn composite(family: Family, seed: u64, plan: &Plan) -> Result<Option<Compos
         shadow: around(shadow / frames),
         untouched: around(untouched / frames),
         slope: around(product / square),
-    }))
+    };
+    let grid = Grid {
+        columns: TITLES.len(),
+        exposure: 1.0,
+        pictures,
+    };
+    Ok(Some((row, grid)))
 }
 
 impl RoomRow for CompositeRow {
@@ -269,14 +283,14 @@ fn true_exposure(backdrop: &Backdrop, empty: &Picture, valid: &[bool]) -> Result
     Ok(exposure)
 }
 
-/// Compares the composite, the naive composite and the photograph of a frame with the truth.
-fn scores(
+/// Compares the composite, the naive composite and the photograph of a frame with the truth; also gives all four, the truth first.
+fn compare(
     solved: &Solved,
     frame: usize,
     truth: &Arc<LitScene>,
     true_chair: &[Arc<PlacedObject>],
     chair: &Arc<ObjectModel>,
-) -> Result<Scores> {
+) -> Result<(Scores, [Picture; 4])> {
     let (problem, estimate) = (&solved.problem, &solved.solution.estimate);
     let photograph = &problem.photographs[frame];
 
@@ -338,7 +352,7 @@ fn scores(
     let product = |i: usize| (ours_at(i) - pixels[i]).dot(change_at(i));
     let bright =
         |picture: &dyn Fn(usize) -> Vec3| sum(&|i| shown(picture(i)).element_sum(), &covered);
-    Ok(Scores {
+    let scores = Scores {
         chair: psnr(&covered, &ours_at, &truth_at),
         naive: psnr(&covered, &|i| naive.pixels[i], &truth_at),
         brightness: bright(&ours_at) / bright(&truth_at),
@@ -350,5 +364,10 @@ fn scores(
                 sum(&|i| change_at(i).length_squared(), &around),
             ]
         }),
-    })
+    };
+    let truth = Picture {
+        pixels: (0..pixels.len()).map(truth_at).collect(),
+        ..layers.with
+    };
+    Ok((scores, [truth, ours, naive, photograph.picture()]))
 }
