@@ -129,9 +129,9 @@ fn insertions(arguments: &StudyArguments, rooms: u32, family: &str) -> Result<()
         match composite(family, seed, &plan)? {
             Some((row, pictures)) => {
                 say::note(row.words());
-                rows.append(row)?;
                 let name = format!("insertion-{}-{seed}.png", family.name());
                 pictures.write(&arguments.out.join(name))?;
+                rows.append(row)?;
             }
             None => say::note("  no free place on its floor that photographs see"),
         }

@@ -76,7 +76,10 @@ pub fn standard_errors(
     let prior = PriorTerms::new(equations, free);
     let variances = match &equations.coupling {
         Coupling::Dense(hessian) => sandwich(hessian, &scores.gram(), &prior),
-        Coupling::Sparse(slopes) => bootstrap(slopes, scores, &prior, equations),
+        Coupling::Sparse(slopes) => {
+            let diagonal = &equations.diagonal;
+            bootstrap(SparseHessian { slopes, diagonal }, scores, &prior)
+        }
     };
     let mut errors = StandardErrors {
         albedo: vec![Vec3::splat(ALBEDO_DEVIATION); objects],
@@ -218,14 +221,7 @@ fn sandwich(
 
 /// The same variances by the multiplier bootstrap (Wu 1986): with random signs ε of the clusters, (H + P)⁻¹ Σ ε g has the
 /// covariance of the estimate.
-fn bootstrap(
-    slopes: &SparseRows,
-    scores: &SparseRows,
-    prior: &PriorTerms,
-    equations: &NormalEquations,
-) -> Vec<DVec3> {
-    let diagonal = &equations.diagonal;
-    let hessian = SparseHessian { slopes, diagonal };
+fn bootstrap(hessian: SparseHessian, scores: &SparseRows, prior: &PriorTerms) -> Vec<DVec3> {
     let n = prior.added.len();
     let (free, zero) = (vec![DVec3::ONE; n], vec![DVec3::ZERO; n]);
     let draws: Vec<Vec<DVec3>> = (0..DRAWS)

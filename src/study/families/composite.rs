@@ -36,7 +36,7 @@ const FRAMES: usize = 2;
 /// Range of the fraction of a photograph that it covers.
 const COVERED: [f64; 2] = [0.005, 0.3];
 /// Samples per pixel of the composite and of the truth, both in two halves and denoised.
-const SAMPLES: [u32; 2] = [64, 64];
+const SAMPLES: u32 = 64;
 /// Shadow and bleed are the pixels beside the chair that it changes by more than this, at the photograph's exposure.
 const CHANGED: f32 = 0.025;
 /// Captions of the pictures of a photograph.
@@ -299,7 +299,7 @@ fn compare(
         |scene: &Scene, exposure| Backdrop::new(frame, &scene.cameras[frame], photograph, exposure);
     let true_backdrop = backdrop(&truth.scene, Exposure::default())?;
     let full = PathOptions::default();
-    let (_, layers) = insert(truth, &true_backdrop, true_chair, full, [2, 4], SAMPLES[1]);
+    let (_, layers) = insert(truth, &true_backdrop, true_chair, full, [2, 4], SAMPLES);
     let pixels = &photograph.pixels;
     let valid: Vec<bool> = (0..pixels.len())
         .map(|i| photograph.is_usable(i) && !photograph.is_saturated(i))
@@ -317,7 +317,7 @@ fn compare(
     let placed = [placed(chair, scene)?];
     let lit = Arc::new(estimate.lit(scene));
     let plain = backdrop(scene, estimate.exposure(frame))?;
-    let (ours, _) = insert(&lit, &plain, &placed, full, [1, 3], SAMPLES[0]);
+    let (ours, _) = insert(&lit, &plain, &placed, full, [1, 3], SAMPLES);
     let pictures: Vec<Picture> = (problem.photographs.iter()).map(|p| p.picture()).collect();
     let light = harmonics_of_photographs(scene.cameras.iter().zip(&pictures));
     let naive = Pasted::new(&plain, &lit, &placed, &[light], Exposure::default());
