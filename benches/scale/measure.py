@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Seconds and peak memory of `relit solve` over triangles, photographs and objects.
 
-    cargo build --release --manifest-path benches/scale/Cargo.toml
+    cargo build --release -p scale-bench
     benches/scale/measure.py [--quick] [--relit target/release/relit] [--out benches/scale]
 
 Writes scale.csv and, where matplotlib is installed, scale.png. Captures are halls with boxes, made for the purpose; one
@@ -68,7 +68,7 @@ def plot(rows, path):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--relit", default="target/release/relit")
-    parser.add_argument("--maker", default=str(pathlib.Path(__file__).parent / "target/release/scale-bench"))
+    parser.add_argument("--maker", default="target/release/scale-bench")
     parser.add_argument("--preset", default="balanced")
     parser.add_argument("--limit", type=float, default=600.0, help="seconds after which a solve is ended")
     parser.add_argument("--quick", action="store_true")

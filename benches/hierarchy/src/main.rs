@@ -54,6 +54,9 @@ fn main() {
     }
 }
 
+/// Builds the hierarchy of a scene.
+type Builder<'a> = Box<dyn Fn() -> Bvh + 'a>;
+
 fn compare(scene: &Scene, runs: usize, builder: &str) {
     let (ours, ours_built) = fastest(|| Bvh::new(&scene.positions, &scene.triangles));
     let (bounces, shadows) = scene.bounce_rays(&ours, RAYS);
@@ -63,7 +66,7 @@ fn compare(scene: &Scene, runs: usize, builder: &str) {
         pre_split: false,
         ..slow
     };
-    let builders: [(&str, Box<dyn Fn() -> Bvh + '_>); 7] = [
+    let builders: [(&str, Builder<'_>); 7] = [
         ("medium", Box::new(obvhs(BvhBuildParams::medium_build()))),
         ("slow, unsplit", Box::new(obvhs(unsplit))),
         ("slow", Box::new(obvhs(slow))),
