@@ -57,8 +57,16 @@ fn photographed(mesh: Mesh, materials: &[Material]) -> Problem {
     scenes::photographed(&capture, materials, 160, 43)
 }
 
+/// With a third of the paths of the preset.
+fn settings() -> Settings {
+    Settings {
+        paths: 500_000,
+        ..Settings::default()
+    }
+}
+
 fn solved(problem: &Problem) -> Solution {
-    scenes::solved(problem, &Settings::default())
+    scenes::solved(problem, &settings())
 }
 
 static ROUGH_ROOM: LazyLock<(Problem, Solution, Vec<Material>)> = LazyLock::new(|| {

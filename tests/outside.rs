@@ -6,6 +6,7 @@ use glam::{DVec3, Vec3};
 use relit::calibrate::gbuffer::GBuffer;
 use relit::calibrate::held_out::HoldOut;
 use relit::calibrate::problem::Problem;
+use relit::capture::Capture;
 use relit::capture::mesh::Mesh;
 use relit::capture::photograph::Photograph;
 use relit::inverse::estimate::Estimate;
@@ -19,7 +20,7 @@ use relit::transport::material::Material;
 use relit::transport::surroundings::Surroundings;
 use scenes::View;
 use std::f32::consts::PI;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 const SIZE: [u32; 2] = [64, 48];
 /// Where photographs saturate: a half to a fifth of the sky above the horizon.
@@ -117,9 +118,18 @@ fn a_room_lit_through_its_window_keeps_its_walls_dark() {
     assert!(errors[errors.len() - 1] < 0.08, "{errors:?}");
 }
 
-/// A sun that no photograph shows, through the window: the photographed room, its materials, the direction towards the sun, and its
-/// irradiance, twice that of a uniform sky of radiance 4.
-fn sunny_room() -> (Problem, Vec<Material>, Vec3, Vec3) {
+/// The room under a sky with a sun that no photograph shows.
+struct Sunny {
+    capture: Capture,
+    photographs: Vec<Arc<Photograph>>,
+    materials: Vec<Material>,
+    /// Direction towards the sun.
+    sun: Vec3,
+    /// The sun's irradiance, twice that of a uniform sky of radiance 4.
+    irradiance: Vec3,
+}
+
+static SUNNY: LazyLock<Sunny> = LazyLock::new(|| {
     let (width, height) = (256, 128);
     let pixel = pixel_of(width, height, Vec3::new(0.2, 0.8, 0.6));
     let mut pixels: Vec<Vec3> = (0..width * height)
@@ -131,29 +141,47 @@ fn sunny_room() -> (Problem, Vec<Material>, Vec3, Vec3) {
     let (mesh, materials) = room_with_a_window();
     let capture = scenes::capture(mesh, &views(), SIZE);
     let problem = scenes::photographed_under(lit_by, &capture, &materials, 512, 75);
-    let sun = direction_of(width, height, pixel);
-    (problem, materials, sun, irradiance)
+    Sunny {
+        capture,
+        photographs: problem.photographs,
+        materials,
+        sun: direction_of(width, height, pixel),
+        irradiance,
+    }
+});
+
+impl Sunny {
+    /// What a solve finds if the room is a scan, or is none.
+    fn solved(&self, scanned: bool) -> Estimate {
+        let mut scene = Scene::new(&self.capture).expect("the room is sound");
+        scene.scanned = scanned;
+        let problem = Problem {
+            scene: Arc::new(scene),
+            photographs: self.photographs.clone(),
+        };
+        run(&problem).estimate
+    }
 }
 
 /// It is found by the pool of light that it throws into the room.
 #[test]
 fn a_sun_through_the_window_is_found_by_where_its_light_falls() {
-    let (problem, materials, sun, irradiance) = sunny_room();
-    let estimate = run(&problem).estimate;
+    let sunny = &*SUNNY;
+    let estimate = sunny.solved(false);
     let outside = estimate.outside.as_ref().expect("the sky is seen");
     let [width, height] = [outside.width, outside.height].map(|side| side as usize);
     let brightest = (0..outside.pixels.len())
         .max_by(|&a, &b| outside.pixels[a].y.total_cmp(&outside.pixels[b].y))
         .expect("a map has pixels");
-    let angle = direction_of(width, height, brightest).angle_between(sun);
+    let angle = direction_of(width, height, brightest).angle_between(sunny.sun);
     let angle = angle.to_degrees();
     let solid_angle = row_solid_angle(brightest / width, width, height) as f32;
-    let found = outside.pixels[brightest] * solid_angle / irradiance;
+    let found = outside.pixels[brightest] * solid_angle / sunny.irradiance;
     println!("{angle}° off, {found} of its irradiance");
     assert!(angle < 3.0, "{angle}");
     assert!((found - 1.0).abs().max_element() < 0.1, "{found}");
     // 0.043 and 0.089 are seen.
-    let errors = relative_errors(&estimate, &materials);
+    let errors = relative_errors(&estimate, &sunny.materials);
     assert!(errors[errors.len() / 2] < 0.06, "{errors:?}");
     assert!(errors[errors.len() - 1] < 0.12, "{errors:?}");
 }
@@ -161,21 +189,19 @@ fn a_sun_through_the_window_is_found_by_where_its_light_falls() {
 /// Beyond the box around a scan it is a disc of its own.
 #[test]
 fn a_sun_is_found_beyond_the_box_around_a_scan() {
-    let (mut problem, materials, sun, irradiance) = sunny_room();
-    let scene = Arc::get_mut(&mut problem.scene).expect("nothing else holds it");
-    scene.scanned = true;
-    let estimate = run(&problem).estimate;
+    let sunny = &*SUNNY;
+    let estimate = sunny.solved(true);
     let outside = estimate.outside.as_ref().expect("the sky is seen");
     assert!(matches!(outside.surroundings, Surroundings::Box { .. }));
     let found = outside.sun.expect("a sun");
-    let angle = found.direction.angle_between(sun).to_degrees();
-    let ratio = found.irradiance / irradiance;
+    let angle = found.direction.angle_between(sunny.sun).to_degrees();
+    let ratio = found.irradiance / sunny.irradiance;
     println!("{angle}° off, {ratio} of its irradiance");
     assert!(angle < 3.0, "{angle}");
     // 0.88 to 0.92 are seen.
     assert!((ratio - 1.0).abs().max_element() < 0.2, "{ratio}");
     // 0.020 is seen.
-    let errors = relative_errors(&estimate, &materials);
+    let errors = relative_errors(&estimate, &sunny.materials);
     assert!(errors[errors.len() / 2] < 0.04, "{errors:?}");
 }
 
@@ -222,11 +248,11 @@ fn a_saturated_sky_is_a_bound_only_where_nothing_measured_it() {
     assert_eq!(bound, Some(Vec3::ONE));
 }
 
-/// The room with its window in photographs that show the sky as white, and its materials. `noise` seeds the photographs.
-fn overexposed(noise: u64) -> (Problem, Vec<Material>) {
+/// The room with its window in photographs that show the sky as white, and its materials. `noise` seeds the photographs of so many `samples`.
+fn overexposed(samples: u32, noise: u64) -> (Problem, Vec<Material>) {
     let (mesh, materials) = room_with_a_window();
     let capture = scenes::capture(mesh, &views(), SIZE);
-    let mut problem = scenes::photographed_under(Some(sky()), &capture, &materials, 512, noise);
+    let mut problem = scenes::photographed_under(Some(sky()), &capture, &materials, samples, noise);
     for photograph in &mut problem.photographs {
         scenes::clip(Arc::make_mut(photograph), CLIPPED);
     }
@@ -239,7 +265,7 @@ fn a_sky_that_all_photographs_show_as_white_is_found_by_its_light() {
     // One photograph's noise decides much: the mean over several tells.
     const NOISES: u64 = 4;
     let found = (74..74 + NOISES).map(|noise| {
-        let (problem, materials) = overexposed(noise);
+        let (problem, materials) = overexposed(512, noise);
         let errors = relative_errors(&run(&problem).estimate, &materials);
         [errors[errors.len() / 2], errors[errors.len() - 1]]
     });
@@ -267,7 +293,7 @@ impl Observer for Keeper {
 /// What the light field found of the sky is in its checkpoint: a solve that is taken up there ends as if it had gone on.
 #[test]
 fn a_solve_goes_on_with_what_it_found_of_an_overexposed_sky() {
-    let (problem, _) = overexposed(74);
+    let (problem, _) = overexposed(64, 74);
     let settings = Settings {
         textures: false,
         lobes: false,

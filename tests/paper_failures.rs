@@ -14,6 +14,14 @@ use std::sync::Arc;
 
 const FLOOR: usize = 2;
 
+/// With a third of the paths of the preset.
+fn settings() -> Settings {
+    Settings {
+        paths: 500_000,
+        ..Settings::default()
+    }
+}
+
 /// The lamp room's photographs, beside a mesh that lacks the objects of the given names; and the materials of the rest.
 fn room_without(names: &[&str]) -> (Problem, Vec<Material>) {
     let more = [
@@ -76,7 +84,7 @@ fn a_lamp_that_the_mesh_lacks() {
 fn a_lamp_that_a_scan_lacks_is_found_near_by() {
     let (mut problem, materials) = room_without(&["ceiling", "lamp"]);
     Arc::get_mut(&mut problem.scene).expect("one owner").scanned = true;
-    let solution = scenes::solved(&problem, &Settings::default());
+    let solution = scenes::solved(&problem, &settings());
     let outside = solution.estimate.outside.as_ref().expect("light");
     assert!(matches!(outside.surroundings, Surroundings::Box { .. }));
     let errors = errors(&solution.estimate, &materials);
@@ -90,7 +98,7 @@ fn a_lamp_that_a_scan_lacks_is_found_near_by() {
 #[test]
 fn a_part_that_the_mesh_lacks() {
     let (problem, materials) = room_without(&["block"]);
-    let solution = scenes::solved(&problem, &Settings::default());
+    let solution = scenes::solved(&problem, &settings());
     for stage in &solution.progress.stages {
         println!("{}: {}", stage.name, stage.why);
     }

@@ -18,7 +18,7 @@ use relit::transport::surroundings::Surroundings;
 use std::sync::Arc;
 
 /// Samples a pixel.
-const SAMPLES: u32 = 32;
+const SAMPLES: u32 = 8;
 /// Blocks a side over which means are compared.
 const BLOCKS: usize = 3;
 

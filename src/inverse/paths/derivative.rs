@@ -124,6 +124,11 @@ pub fn differentiate(
     let patch = |patch: u32| Vec3A::from(reflected[patch as usize]);
     let mut throughput = Vec3A::ONE;
     for (vertex, g) in vertices.iter().zip(&*incident) {
+        // What follows on a long path adds less than a float holds, and arithmetic on subnormal numbers is slow.
+        let largest = throughput.max_element();
+        if largest > 0.0 && largest < f32::MIN_POSITIVE {
+            break;
+        }
         if vertex.surface != SPECULAR {
             let surface = vertex.surface as usize;
             if vertex.emission_weight != 0.0 {
