@@ -153,12 +153,20 @@ impl Pipeline<'_, '_> {
         if sun.is_none() {
             return Ok(plain);
         }
-        let sunny = if self.problem.scene.scanned {
-            self.add_sun(sun, without.prior, field)?
-        } else {
-            // With the sun known, windows and lamps are told apart anew.
-            self.go_back_to(without);
-            self.fit_open(Surroundings::Far, sun, field)?
+        // To a scan's light it is also added as it is; the better of both is taken.
+        let added = match self.problem.scene.scanned {
+            true => Some(self.add_sun(sun, without.prior.clone(), field)?),
+            false => None,
+        };
+        // With the sun known, windows and lamps are told apart anew.
+        self.go_back_to(without);
+        let anew = self.fit_open(self.outside.surroundings, sun, field)?;
+        let sunny = match added {
+            Some(added) if added.misfit.mean() < anew.misfit.mean() => {
+                self.go_back_to(added.found.clone());
+                added
+            }
+            _ => anew,
         };
         let fall = plain.misfit.mean() - sunny.misfit.mean();
         Ok(match fall > needed && self.sun_shines() {
