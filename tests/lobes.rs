@@ -57,16 +57,8 @@ fn photographed(mesh: Mesh, materials: &[Material]) -> Problem {
     scenes::photographed(&capture, materials, 160, 43)
 }
 
-/// With a third of the paths of the preset.
-fn settings() -> Settings {
-    Settings {
-        paths: 500_000,
-        ..Settings::default()
-    }
-}
-
 fn solved(problem: &Problem) -> Solution {
-    scenes::solved(problem, &settings())
+    scenes::solved(problem, &scenes::with_fewer_paths())
 }
 
 static ROUGH_ROOM: LazyLock<(Problem, Solution, Vec<Material>)> = LazyLock::new(|| {

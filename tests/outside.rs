@@ -248,7 +248,8 @@ fn a_saturated_sky_is_a_bound_only_where_nothing_measured_it() {
     assert_eq!(bound, Some(Vec3::ONE));
 }
 
-/// The room with its window in photographs that show the sky as white, and its materials. `noise` seeds the photographs of so many `samples`.
+/// The room with its window in photographs that show the sky as white, and its materials. The photographs have so many samples a
+/// pixel and are seeded by `noise`.
 fn overexposed(samples: u32, noise: u64) -> (Problem, Vec<Material>) {
     let (mesh, materials) = room_with_a_window();
     let capture = scenes::capture(mesh, &views(), SIZE);

@@ -14,14 +14,6 @@ use std::sync::Arc;
 
 const FLOOR: usize = 2;
 
-/// With a third of the paths of the preset.
-fn settings() -> Settings {
-    Settings {
-        paths: 500_000,
-        ..Settings::default()
-    }
-}
-
 /// The lamp room's photographs, beside a mesh that lacks the objects of the given names; and the materials of the rest.
 fn room_without(names: &[&str]) -> (Problem, Vec<Material>) {
     let more = [
@@ -84,7 +76,7 @@ fn a_lamp_that_the_mesh_lacks() {
 fn a_lamp_that_a_scan_lacks_is_found_near_by() {
     let (mut problem, materials) = room_without(&["ceiling", "lamp"]);
     Arc::get_mut(&mut problem.scene).expect("one owner").scanned = true;
-    let solution = scenes::solved(&problem, &settings());
+    let solution = scenes::solved(&problem, &scenes::with_fewer_paths());
     let outside = solution.estimate.outside.as_ref().expect("light");
     assert!(matches!(outside.surroundings, Surroundings::Box { .. }));
     let errors = errors(&solution.estimate, &materials);
@@ -98,7 +90,7 @@ fn a_lamp_that_a_scan_lacks_is_found_near_by() {
 #[test]
 fn a_part_that_the_mesh_lacks() {
     let (problem, materials) = room_without(&["block"]);
-    let solution = scenes::solved(&problem, &settings());
+    let solution = scenes::solved(&problem, &scenes::with_fewer_paths());
     for stage in &solution.progress.stages {
         println!("{}: {}", stage.name, stage.why);
     }

@@ -217,7 +217,8 @@ fn same_object(guides: &[Option<Guide>], a: usize, b: usize) -> bool {
     a == b || object(a).is_some_and(|here| object(b) == Some(here))
 }
 
-/// The guides with normals averaged over their neighbourhoods; edges stay, since normals across them hardly count.
+/// The guides with normals averaged over their neighbourhoods; edges stay, since normals across them hardly count. On a [`ROUGH`]
+/// surface all count alike.
 fn steadied(guides: &[Option<Guide>], around: Around) -> Vec<Option<Guide>> {
     let steady = |pixel: usize| {
         let guide = guides[pixel]?;

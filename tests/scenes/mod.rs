@@ -258,6 +258,14 @@ impl Observer for Silent {
     }
 }
 
+/// The default settings with a third of the paths.
+pub fn with_fewer_paths() -> Settings {
+    Settings {
+        paths: 500_000,
+        ..Settings::default()
+    }
+}
+
 /// Solves without steering.
 pub fn solved(problem: &Problem, settings: &Settings) -> Solution {
     solve(problem, settings, None, &mut Silent).expect("nothing to resume")
