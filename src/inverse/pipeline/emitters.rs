@@ -1,6 +1,6 @@
 //! Settles which objects emit light, by tests on stored paths, and sets the weights of light sampling.
 
-use crate::inverse::emitters::classify::classify;
+use crate::inverse::emitters::classify::{Change, classify};
 use crate::inverse::fit::errors::ScoreTest;
 use crate::inverse::fit::gauss_newton::Fit;
 use crate::inverse::paths::PathCache;
@@ -13,7 +13,9 @@ use glam::Vec3;
 /// χ² (three channels) above which an emission is significant.
 pub(super) const SIGNIFICANT: f64 = 25.0;
 /// Greatest number of rounds of role changes.
-const MAX_CHANGES: usize = 8;
+const MAX_CHANGES: usize = 40;
+/// Greatest number of objects that are given an emission beside their albedo.
+const MAX_GLOWING: usize = 8;
 /// An emission below this fraction of an object's photographed radiance is attributed to model error.
 const FAINT: f32 = 0.1;
 /// Fraction of the light samples that are spread over all objects: half by area, half by number, so that small bulbs get some.
@@ -76,11 +78,17 @@ impl Pipeline<'_, '_> {
         let mut was_emitter = vec![false; self.roles.len()];
         for _ in 0..MAX_CHANGES {
             let mut changed = false;
-            for change in classify(cache, &self.unknowns, &self.roles) {
+            let mut changes = classify(cache, &self.unknowns, &self.roles);
+            // An object that became a reflector stays one, which ends oscillations.
+            changes.retain(|change| !was_emitter[change.object]);
+            if self.problem.scene.scanned {
+                leave_brightest(&mut changes);
+            }
+            for change in changes {
                 let k = change.object;
                 let role = role_under(self.monitor.known.object(k), change.role);
-                // An object that became a reflector stays one, which ends oscillations; known roles do not change.
-                if was_emitter[k] || role == self.roles[k] {
+                // Known roles do not change.
+                if role == self.roles[k] {
                     continue;
                 }
                 changed = true;
@@ -113,7 +121,7 @@ impl Pipeline<'_, '_> {
         let objects = self.roles.len();
         let in_mesh = self.problem.scene.objects.len();
         let mut added = Vec::new();
-        while added.len() < MAX_CHANGES {
+        while added.len() < MAX_GLOWING {
             let tested = self.test_dark(cache);
             let open = |test: &ScoreTest| {
                 let k = test.index - objects;
@@ -174,5 +182,41 @@ impl Pipeline<'_, '_> {
             weights[k] += added * 0.5 * (area(k) / all + 1.0 / over.len() as f64);
         }
         weights
+    }
+}
+
+/// Removes all changes to emitters but the brightest one. Lamps of a scan are saturated, and so are surfaces beside them: once the
+/// lamp is as bright as the room tells, these may be explained by its light.
+fn leave_brightest(changes: &mut Vec<Change>) {
+    let emitters = (changes.iter()).filter(|change| change.role == Role::Emitter);
+    let brightest = emitters
+        .max_by(|a, b| a.value.length().total_cmp(&b.value.length()))
+        .map(|change| change.object);
+    changes.retain(|change| change.role != Role::Emitter || Some(change.object) == brightest);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_the_new_lamps_of_a_scan_the_brightest_comes_first() {
+        let change = |object, role, value| Change {
+            object,
+            role,
+            value: Vec3::splat(value),
+        };
+        let mut changes = vec![
+            change(0, Role::Emitter, 2.0),
+            change(1, Role::Reflector, 0.5),
+            change(2, Role::Emitter, 8.0),
+            change(3, Role::Emitter, 7.0),
+        ];
+        leave_brightest(&mut changes);
+        let left: Vec<usize> = changes.iter().map(|change| change.object).collect();
+        assert_eq!(left, [1, 2]);
+        let mut none = vec![change(1, Role::Reflector, 9.0)];
+        leave_brightest(&mut none);
+        assert_eq!(none.len(), 1);
     }
 }

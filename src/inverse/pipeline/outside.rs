@@ -20,8 +20,11 @@ use glam::{DVec3, Vec3};
 
 /// Least fraction of paths that leave the mesh for which outside light is tried.
 const ESCAPING: f64 = 1e-3;
-/// Least fall of the squared error by outside light, and then by a sun, relative to that without either.
+/// Least fall of the squared error by outside light, and then by a sun, relative to that without either; and by a scan's outside
+/// light without measurements.
 const OUTSIDE_GAIN: f64 = 0.03;
+/// Greatest number of paths of a trial: those of a light field of `preview`, whose families of rooms show what they decide.
+const TRIAL_PATHS: u64 = 400_000;
 /// Standard errors by which the squared error falls.
 const FALL_ERRORS: f64 = 4.0;
 /// Standard errors by which a sun's light exceeds zero, as usual for one unknown: the squared error decides about its direction.
@@ -88,6 +91,11 @@ impl Pipeline<'_, '_> {
         } else {
             self.light_through_windows(field)?
         };
+        // The chosen light is fitted to as many paths as the light field.
+        if self.open && self.trial_paths() < self.budget.light_field_paths {
+            let paths = self.paths_of(field, self.budget.light_field_paths)?;
+            self.weigh(&paths)?;
+        }
         self.describe();
         let why = format!("{leave}; light from there {what}");
         self.record("outside light", started, self.open, why)
@@ -106,7 +114,8 @@ impl Pipeline<'_, '_> {
         }
         let without = self.found();
         let before = Misfit::new(field.cache, &without.unknowns);
-        let plain = self.fit_open(Surroundings::Far, None, field)?;
+        let sky = self.measured_outside(Surroundings::Far);
+        let plain = self.fit_open(sky, Surroundings::Far, None, field)?;
         let needed = OUTSIDE_GAIN * before.mean();
         let best = self.with_sun(without.clone(), plain, needed, field)?;
         if !before.falls(&best.misfit, OUTSIDE_GAIN * before.mean()) {
@@ -122,22 +131,40 @@ impl Pipeline<'_, '_> {
         ))
     }
 
-    /// Fits light from a box around a scan, and tries a sun beyond it. Returns in words what the light does.
+    /// Fits light from a box around a scan: as photographs measured it where they see past the mesh, with a sun if there is one, and
+    /// without these measurements. What is seen through a hole may be as near as a lamp that has no depth, and on the box it would
+    /// light the wrong places. Returns in words what the light does.
     fn light_around_scan(&mut self, field: LightField) -> Result<String> {
         let scene = &self.problem.scene;
         let cameras = scene.cameras.iter().map(|camera| camera.center);
         let around = Surroundings::around(scene.positions.iter().copied().chain(cameras));
         let around = around.unwrap_or(Surroundings::Far);
-        let without = self.found();
-        let plain = self.fit_open(around, None, field)?;
-        let needed = OUTSIDE_GAIN * plain.misfit.mean();
-        let best = self.with_sun(without, plain, needed, field)?;
-        self.go_back_to(best.found);
         let from = match around {
             Surroundings::Far => "far away",
             Surroundings::Box { .. } => "a box around the mesh",
         };
+        let without = self.found();
+        let unmeasured = self.fit_open(None, around, None, field)?;
+        let sky = self.measured_outside(around);
+        if sky.is_none() {
+            return Ok(format!("comes from {from}"));
+        }
+        self.go_back_to(without.clone());
+        let plain = self.fit_open(sky, around, None, field)?;
+        let needed = OUTSIDE_GAIN * plain.misfit.mean();
+        let measured = self.with_sun(without, plain, needed, field)?;
+        if unmeasured.misfit.mean() < (1.0 - OUTSIDE_GAIN) * measured.misfit.mean() {
+            self.go_back_to(unmeasured.found);
+            return Ok(format!(
+                "comes from {from}; what photographs show past the mesh does not explain it"
+            ));
+        }
+        self.go_back_to(measured.found);
         Ok(format!("comes from {from}{}", self.sun_in_words()))
+    }
+
+    fn measured_outside(&self, surroundings: Surroundings) -> Option<MeasuredOutside> {
+        MeasuredOutside::new(self.problem, &self.gbuffer, surroundings)
     }
 
     /// Searches for a sun after a fit of outside light without one, and fits with the best candidate. Returns the fit with the sun
@@ -160,7 +187,8 @@ impl Pipeline<'_, '_> {
         };
         // With the sun known, windows and lamps are told apart anew.
         self.go_back_to(without);
-        let anew = self.fit_open(self.outside.surroundings, sun, field)?;
+        let sky = plain.found.sky.clone();
+        let anew = self.fit_open(sky, self.outside.surroundings, sun, field)?;
         let sunny = match added {
             Some(added) if added.misfit.mean() < anew.misfit.mean() => {
                 self.go_back_to(added.found.clone());
@@ -184,7 +212,7 @@ impl Pipeline<'_, '_> {
         self.roles[surface] = Role::Unseen;
         self.unknowns.emission[surface] = mean_radiance(&self.clusters);
         self.robust = RobustWeights::even(self.roles.len());
-        let paths = self.paths_of(field)?;
+        let paths = self.paths_of(field, self.trial_paths())?;
         let fitted = self.fit(&paths)?;
         self.settle_roles(&paths, fitted)?;
         self.weigh(&paths)?;
@@ -206,8 +234,10 @@ impl Pipeline<'_, '_> {
         found > SUN_ERRORS * luminance(self.errors.emission[sun])
     }
 
+    /// Tells lamps from walls with light from outside, measured in the directions of `sky`, and a sun if its direction is given.
     fn fit_open(
         &mut self,
+        sky: Option<MeasuredOutside>,
         surroundings: Surroundings,
         sun: Option<Vec3>,
         field: LightField,
@@ -215,22 +245,25 @@ impl Pipeline<'_, '_> {
         self.open = true;
         self.outside.surroundings = surroundings;
         self.outside.sun = sun;
-        self.sky = MeasuredOutside::new(self.problem, &self.gbuffer, surroundings);
+        self.sky = sky;
         self.expect_of_outside();
         let as_stored = self.sky.is_none() && surroundings == Surroundings::Far && sun.is_none();
         let paths = match as_stored {
             true => None,
-            false => Some(self.paths_of(field)?),
+            false => Some(self.paths_of(field, self.trial_paths())?),
         };
         self.tell_lamps(paths.as_ref().unwrap_or(field.cache), Role::Unseen)?;
         self.trial(paths, field.cache)
     }
 
     /// Paths as of the light field, with the present light from outside.
-    fn paths_of(&mut self, field: LightField) -> Result<PathCache> {
-        let count = self.budget.light_field_paths;
+    fn paths_of(&mut self, field: LightField, count: u64) -> Result<PathCache> {
         let (paths, _) = self.stored(field.lights, Some(field.measured), 0, count)?;
         Ok(paths)
+    }
+
+    fn trial_paths(&self) -> u64 {
+        self.budget.light_field_paths.min(TRIAL_PATHS)
     }
 
     /// Fits again with the expected colours of outside light. `paths` replace the stored ones of `cache`.
