@@ -368,7 +368,7 @@ fn textures_of_the_transport_cache_and_patches_of_the_descent_beat_one_colour_an
         unknowns[3] > unknowns[2] && unknowns.windows(2).skip(2).all(|pair| pair[0] <= pair[1]),
         "{unknowns:?}"
     );
-    // 28.8 dB against 26.7 are seen.
+    // 29.3 dB against 26.8 are seen.
     assert!(psnr[1] > psnr[0] + 1.5, "{psnr:?}");
     let best = psnr[3..].iter().copied().fold(0.0, f64::max);
     assert!(best > psnr[2] + 1.0, "{psnr:?}");

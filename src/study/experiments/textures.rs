@@ -29,6 +29,8 @@ pub const STUDY: Study = Study {
 
 /// Bounces of the descent here: the photographs have all bounces, and light cut off by two would bias the albedos.
 const BOUNCES: u64 = 8;
+/// Paths of a round of the transport cache in a quick study.
+const QUICK_PATHS: u64 = 300_000;
 /// The photograph whose albedo is shown.
 const SHOWN: usize = 0;
 
@@ -74,6 +76,7 @@ fn run(bench: &Bench) -> Result<Findings> {
     let with_textures = Settings {
         preset: Preset::Balanced,
         textures: true,
+        paths: if bench.quick { QUICK_PATHS } else { 0 },
         ..of_objects.clone()
     };
     let mut states = Vec::new();
