@@ -77,21 +77,20 @@ impl Pipeline<'_, '_> {
         self.take_values(&fitted);
         let mut was_emitter = vec![false; self.roles.len()];
         for _ in 0..MAX_CHANGES {
-            let mut changed = false;
             let mut changes = classify(cache, &self.unknowns, &self.roles);
-            // An object that became a reflector stays one, which ends oscillations.
-            changes.retain(|change| !was_emitter[change.object]);
+            for change in &mut changes {
+                change.role = role_under(self.monitor.known.object(change.object), change.role);
+            }
+            // An object that became a reflector stays one, which ends oscillations; known roles do not change.
+            changes.retain(|c| !was_emitter[c.object] && c.role != self.roles[c.object]);
             if self.problem.scene.scanned {
                 leave_brightest(&mut changes);
             }
+            if changes.is_empty() {
+                break;
+            }
             for change in changes {
-                let k = change.object;
-                let role = role_under(self.monitor.known.object(k), change.role);
-                // Known roles do not change.
-                if role == self.roles[k] {
-                    continue;
-                }
-                changed = true;
+                let (k, role) = (change.object, change.role);
                 self.roles[k] = role;
                 if role.emits() {
                     self.unknowns.albedo[k] = Vec3::ZERO;
@@ -101,9 +100,6 @@ impl Pipeline<'_, '_> {
                     self.unknowns.albedo[k] = change.value;
                     self.unknowns.emission[k] = Vec3::ZERO;
                 }
-            }
-            if !changed {
-                break;
             }
             self.hold();
             fitted = self.fit(cache)?;
@@ -188,11 +184,11 @@ impl Pipeline<'_, '_> {
 /// Removes all changes to emitters but the brightest one. Lamps of a scan are saturated, and so are surfaces beside them: once the
 /// lamp is as bright as the room tells, these may be explained by its light.
 fn leave_brightest(changes: &mut Vec<Change>) {
-    let emitters = (changes.iter()).filter(|change| change.role == Role::Emitter);
+    let emitters = (changes.iter()).filter(|change| change.role.emits());
     let brightest = emitters
         .max_by(|a, b| a.value.length().total_cmp(&b.value.length()))
         .map(|change| change.object);
-    changes.retain(|change| change.role != Role::Emitter || Some(change.object) == brightest);
+    changes.retain(|change| !change.role.emits() || Some(change.object) == brightest);
 }
 
 #[cfg(test)]

@@ -23,7 +23,7 @@ const ESCAPING: f64 = 1e-3;
 /// Least fall of the squared error by outside light, and then by a sun, relative to that without either; and by a scan's outside
 /// light without measurements.
 const OUTSIDE_GAIN: f64 = 0.03;
-/// Greatest number of paths of a trial: those of a light field of `preview`, whose families of rooms show what they decide.
+/// Greatest number of paths of a trial: as many as the light field of `preview` has, which the benchmarks of scanned rooms measure.
 const TRIAL_PATHS: u64 = 400_000;
 /// Standard errors by which the squared error falls.
 const FALL_ERRORS: f64 = 4.0;
