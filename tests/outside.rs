@@ -180,10 +180,10 @@ fn a_sun_through_the_window_is_found_by_where_its_light_falls() {
     println!("{angle}° off, {found} of its irradiance");
     assert!(angle < 3.0, "{angle}");
     assert!((found - 1.0).abs().max_element() < 0.1, "{found}");
-    // 0.043 and 0.089 are seen.
+    // 0.024 and 0.048 are seen; 0.043 and 0.089 with the sun's direction as it is first found.
     let errors = relative_errors(&estimate, &sunny.materials);
-    assert!(errors[errors.len() / 2] < 0.06, "{errors:?}");
-    assert!(errors[errors.len() - 1] < 0.12, "{errors:?}");
+    assert!(errors[errors.len() / 2] < 0.035, "{errors:?}");
+    assert!(errors[errors.len() - 1] < 0.07, "{errors:?}");
 }
 
 /// Beyond the box around a scan it is a disc of its own.
@@ -200,7 +200,7 @@ fn a_sun_is_found_beyond_the_box_around_a_scan() {
     assert!(angle < 3.0, "{angle}");
     // 0.88 to 0.92 are seen.
     assert!((ratio - 1.0).abs().max_element() < 0.2, "{ratio}");
-    // 0.020 is seen.
+    // 0.018 is seen.
     let errors = relative_errors(&estimate, &sunny.materials);
     assert!(errors[errors.len() / 2] < 0.04, "{errors:?}");
 }

@@ -75,7 +75,7 @@ pub enum Action {
     Export(ExportArguments),
     /// Import a scan of another program as a capture
     Import(ImportArguments),
-    /// Write the built-in room as a capture, with its truth
+    /// Write the built-in room, or a generated one, as a capture with its truth
     Demo(DemoArguments),
     /// Measure the error over time of presets and settings
     #[command(after_help = EXIT_CODES)]

@@ -1,4 +1,4 @@
-//! `relit export` and `relit demo`: files for other programs, and the built-in room as a capture.
+//! `relit export` and `relit demo`: files for other programs, and built-in and generated rooms as captures.
 
 use crate::cli::numbers::{from_one, triple, whole, width};
 use crate::cli::options::{Replace, SavedOptions};
@@ -6,9 +6,11 @@ use crate::error::{Error, Result};
 use crate::export::overwrite;
 use crate::export::scene::{self, Format};
 use crate::room;
+use crate::room::generated::{self, Family};
 use crate::room::photographs::{Rendering, STORED};
 use crate::say;
-use clap::builder::PossibleValue;
+use crate::study::trade::rooms::SIZE;
+use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use std::path::{Path, PathBuf};
@@ -78,17 +80,20 @@ pub struct DemoArguments {
     out: PathBuf,
     #[command(flatten)]
     replace: Replace,
-    /// Render the photographs again with this random seed, instead of using those stored in the program
+    /// Write a generated room of this family instead of the built-in room; a scanned one without truth
+    #[arg(long, value_name = "NAME", requires = "seed", conflicts_with = "samples",
+          value_parser = PossibleValuesParser::new(Family::NAMES))]
+    family: Option<String>,
+    /// Render the photographs again with this random seed, instead of using those stored in the program; with --family, the number of the room
     #[arg(long, value_name = "N", value_parser = whole::<u64>)]
     seed: Option<u64>,
     /// Samples per pixel of photographs that are rendered again
     #[arg(long, value_name = "N", default_value_t = STORED.samples, requires = "seed",
           value_parser = from_one::<u32>)]
     samples: u32,
-    /// Width in pixels of photographs that are rendered again; their height is three quarters of it
-    #[arg(long, value_name = "PIXELS", default_value_t = STORED.size[0], requires = "seed",
-          value_parser = width)]
-    width: u32,
+    /// Width in pixels of photographs that are rendered; their height is three quarters of it [default: 640; with --family, 96 as in `relit trade`]
+    #[arg(long, value_name = "PIXELS", requires = "seed", value_parser = width)]
+    width: Option<u32>,
 }
 
 /// Writes one file for another program.
@@ -114,15 +119,24 @@ pub fn export(arguments: &ExportArguments) -> Result<()> {
     Ok(())
 }
 
-/// Writes the built-in room with its truth as a capture.
+/// Writes the built-in room or a generated one, with its truth, as a capture.
 pub fn demo(arguments: &DemoArguments) -> Result<()> {
     arguments.replace.apply();
-    let rendering = arguments.seed.map(|seed| Rendering {
-        seed,
-        samples: arguments.samples,
-        size: [arguments.width, arguments.width * 3 / 4],
-    });
-    room::write(&arguments.out, rendering.as_ref())?;
+    let family = arguments.family.as_deref().and_then(Family::of_name);
+    let own_width = if family.is_some() {
+        SIZE[0]
+    } else {
+        STORED.size[0]
+    };
+    let width = arguments.width.unwrap_or(own_width);
+    let size = [width, width * 3 / 4];
+    match (family, arguments.seed) {
+        (Some(family), Some(seed)) => generated::write(&arguments.out, family, seed, size)?,
+        (_, seed) => {
+            let rendering = seed.map(|seed| Rendering::new(seed, arguments.samples, size));
+            room::write(&arguments.out, rendering.as_ref())?;
+        }
+    }
     say::line(arguments.out.display());
     Ok(())
 }

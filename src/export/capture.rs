@@ -1,12 +1,13 @@
-//! Writes a capture folder: transforms.json, mesh.obj, images/NNN.exr, truth.json.
+//! Writes a capture folder: transforms.json, mesh.obj, images, truth.json.
 
-use crate::capture::Capture;
 use crate::capture::camera::{Intrinsics, Pose};
 use crate::capture::mesh::Mesh;
 use crate::capture::read::CAMERAS;
+use crate::capture::{Capture, Frame};
 use crate::error::Result;
 use crate::export::atomic::{WriteError, write_atomically, write_bytes};
 use crate::export::exr::{Precision, write_rgb};
+use crate::export::resample::write_photograph;
 use crate::math::picture::Picture;
 use glam::{DMat4, DVec3};
 use serde::Serialize;
@@ -14,19 +15,20 @@ use serde_json::{Value, json};
 use std::io::Write;
 use std::path::Path;
 
-/// Writes a capture. Photographs become linear EXR files of radiance. A folder that has transforms.json is complete.
+/// Writes a capture: photographs as [`write_photograph`] writes them. A folder that has transforms.json is complete.
 ///
 /// # Errors
 /// A photograph cannot be read or a file cannot be written.
-pub fn write(folder: &Path, capture: &Capture, precision: Precision) -> Result<()> {
+pub fn write(folder: &Path, capture: &Capture) -> Result<()> {
     write_mesh(folder, &capture.mesh)?;
-    for (index, frame) in capture.frames.iter().enumerate() {
-        let photograph = frame.load()?;
-        let picture = photograph.picture();
-        write_rgb(&folder.join(image_name(index)), &picture, precision)?;
-    }
-    let cameras = capture.frames.iter().map(|f| (f.intrinsics, f.pose));
-    write_transforms(folder, cameras, capture.up)
+    let entry = |(index, frame): (usize, &Frame)| {
+        let name = image_name(index);
+        let ending = write_photograph(&folder.join(&name), &*frame.load()?)?;
+        let file_path = format!("{name}.{ending}");
+        Ok(Entry::new(file_path, frame.intrinsics, frame.pose))
+    };
+    let entries: Result<Vec<Entry>> = capture.frames.iter().enumerate().map(entry).collect();
+    write_entries(folder, &entries?, "mesh.obj", Some(capture.up))
 }
 
 /// Writes mesh.obj.
@@ -46,15 +48,24 @@ pub fn write_transforms(
     cameras: impl Iterator<Item = (Intrinsics, Pose)>,
     up: DVec3,
 ) -> Result<()> {
-    let entry = |(index, (intrinsics, pose))| Entry {
-        file_path: image_name(index),
-        intrinsics,
-        pose,
-        exposure: None,
-        depth: None,
+    let entry = |(index, (intrinsics, pose))| {
+        Entry::new(format!("{}.exr", image_name(index)), intrinsics, pose)
     };
-    let entries: Vec<_> = cameras.enumerate().map(entry).collect();
-    let text = format!("{:#}\n", transforms(&entries, "mesh.obj", Some(up)));
+    let entries: Vec<Entry> = cameras.enumerate().map(entry).collect();
+    write_entries(folder, &entries, "mesh.obj", Some(up))
+}
+
+/// Writes transforms.json.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_entries(
+    folder: &Path,
+    entries: &[Entry],
+    mesh_path: &str,
+    up: Option<DVec3>,
+) -> Result<()> {
+    let text = format!("{:#}\n", transforms(entries, mesh_path, up));
     write_bytes(&folder.join(CAMERAS), text.as_bytes())
 }
 
@@ -73,8 +84,9 @@ pub fn write_truth(folder: &Path, truth: &impl Serialize, albedo: &[Picture]) ->
     })
 }
 
+/// Name of a photograph without its extension.
 fn image_name(index: usize) -> String {
-    format!("images/{index:03}.exr")
+    format!("images/{index:03}")
 }
 
 /// One frame of transforms.json.
@@ -92,8 +104,21 @@ pub struct Entry {
     pub depth: Option<(String, f64)>,
 }
 
+impl Entry {
+    /// A photograph without depth, of unknown exposure.
+    pub fn new(file_path: String, intrinsics: Intrinsics, pose: Pose) -> Self {
+        Self {
+            file_path,
+            intrinsics,
+            pose,
+            exposure: None,
+            depth: None,
+        }
+    }
+}
+
 /// The content of transforms.json. Numbers are written so that they read back to the bit.
-pub fn transforms(entries: &[Entry], mesh_path: &str, up: Option<DVec3>) -> Value {
+fn transforms(entries: &[Entry], mesh_path: &str, up: Option<DVec3>) -> Value {
     let shared = entries.first().map(|entry| entry.intrinsics);
     let mut file = json!({"camera_model": "OPENCV", "mesh_path": mesh_path});
     if let Some(shared) = &shared {

@@ -3,10 +3,9 @@
 use crate::capture::import::{DepthImage, Import, ImportedFrame, Lens};
 use crate::capture::orientation::Orientation;
 use crate::capture::photograph::Photograph;
-use crate::capture::read::{CAMERAS, image};
+use crate::capture::read::image;
 use crate::error::{Error, Result};
-use crate::export::atomic::write_bytes;
-use crate::export::capture::{Entry, transforms};
+use crate::export::capture::{Entry, write_entries};
 use crate::export::new_folder::NewFolder;
 use crate::export::{ply, resample};
 use rayon::prelude::*;
@@ -27,8 +26,7 @@ pub fn write(folder: &Path, import: &Import) -> Result<()> {
         .collect();
     let mesh = staging.path().join("mesh.ply");
     ply::write_mesh(&mesh, &import.mesh, import.has_objects)?;
-    let text = format!("{:#}\n", transforms(&entries?, "mesh.ply", import.up));
-    write_bytes(&staging.path().join(CAMERAS), text.as_bytes())?;
+    write_entries(staging.path(), &entries?, "mesh.ply", import.up)?;
     staging.commit()
 }
 

@@ -21,6 +21,7 @@ use crate::export::capture as folder;
 use crate::export::new_folder::NewFolder;
 use crate::math::picture::Picture;
 use crate::scene::camera::Camera;
+use crate::transport::lit::LitScene;
 use photographs::{Rendering, STORED};
 use std::path::Path;
 
@@ -52,19 +53,24 @@ pub fn write(out: &Path, rendering: Option<&Rendering>) -> Result<()> {
     folder::write_mesh(out, &room.mesh)?;
 
     let world = room.lit(rendering_used.size)?;
-    let seen_by = |camera: &Camera| truth::albedo_picture(&world, camera);
-    let albedo: Vec<Picture> = world.scene.cameras.iter().map(seen_by).collect();
-    let truth = truth::Truth {
-        name: "room",
-        renderer: format!("relit {}", env!("CARGO_PKG_VERSION")),
-        max_bounces: None,
-        spp: rendering_used.samples,
-        seed: rendering_used.seed,
-        outside_light: None,
-        objects: truth::objects(&world),
-    };
-    folder::write_truth(out, &truth, &albedo)?;
+    write_truth(out, "room", &world, rendering_used)?;
     let cameras = cameras::cameras(&room.views, rendering_used.size);
     folder::write_transforms(out, cameras.into_iter(), world.scene.up.as_dvec3())?;
     new.commit()
+}
+
+/// Writes truth.json and the true albedo of each frame.
+fn write_truth(out: &Path, name: &str, world: &LitScene, rendering: &Rendering) -> Result<()> {
+    let seen_by = |camera: &Camera| truth::albedo_picture(world, camera);
+    let albedo: Vec<Picture> = world.scene.cameras.iter().map(seen_by).collect();
+    let truth = truth::Truth {
+        name: name.to_owned(),
+        renderer: format!("relit {}", env!("CARGO_PKG_VERSION")),
+        max_bounces: None,
+        spp: rendering.samples,
+        seed: rendering.seed,
+        outside_light: None,
+        objects: truth::objects(world),
+    };
+    folder::write_truth(out, &truth, &albedo)
 }

@@ -23,7 +23,7 @@ const SAMPLES: u64 = 1 << 16;
 #[derive(Debug, Clone, Serialize)]
 pub struct Truth {
     /// The capture's name.
-    pub name: &'static str,
+    pub name: String,
     /// The program that rendered the photographs.
     pub renderer: String,
     /// Most bounces in the photographs; `None` if unbounded.

@@ -2,6 +2,8 @@
 
 use crate::place::Place;
 use crate::{done, refused, solve};
+use relit::capture::read::{ReadOptions, read};
+use relit::room::generated::Family;
 
 #[test]
 fn results_are_exported() {
@@ -45,4 +47,32 @@ fn the_built_in_room_is_written_with_its_truth() {
     ] {
         assert!(place.path("demo").join(name).is_file(), "{name}");
     }
+}
+
+#[test]
+fn a_generated_room_is_written_as_it_was_generated() {
+    let place = Place::new();
+    let size = [32, 24];
+    for (name, tolerance) in [("plain", 0.0), ("phone", 1e-4)] {
+        let demo = ["demo", "--family", name, "--seed", "2", "--width", "32"];
+        done(&place.relit(&[&demo[..], &["--out", name]].concat()));
+        let family = Family::of_name(name).expect("a family");
+        let room = family.generate(2, size).expect("a room");
+        let read = read(&place.path(name), &ReadOptions::default()).expect("a capture");
+        assert_eq!(read.mesh.objects, room.capture.mesh.objects);
+        assert_eq!(read.frames.len(), room.capture.frames.len());
+        for (written, generated) in read.frames.iter().zip(&room.capture.frames) {
+            let [written, generated] =
+                [written, generated].map(|f| f.load().expect("a photograph"));
+            for (a, b) in written.pixels.iter().zip(&generated.pixels) {
+                assert!(
+                    (*a - *b).abs().max_element() <= tolerance,
+                    "{name}: {a} {b}"
+                );
+            }
+        }
+        assert!(place.path(name).join("truth/albedo_000.exr").is_file());
+    }
+    let without_seed = ["demo", "--family", "plain", "--out", "other"];
+    refused(&place.relit(&without_seed), 2, &["--seed"]);
 }

@@ -8,7 +8,6 @@ use relit::capture::photograph::{Encoding, Photograph, PhotographSource};
 use relit::capture::truth::{ObjectTruth, Truth, read_albedo};
 use relit::capture::{Capture, Frame};
 use relit::export::capture::{write, write_truth};
-use relit::export::exr::Precision;
 use relit::math::picture::Picture;
 use std::sync::Arc;
 
@@ -66,7 +65,7 @@ fn capture() -> Capture {
 fn a_written_capture_reads_back() {
     let folder = tempfile::tempdir().unwrap();
     let original = capture();
-    write(folder.path(), &original, Precision::Float).unwrap();
+    write(folder.path(), &original).unwrap();
     let back = open(folder.path()).unwrap();
     assert!(back.warnings.is_empty(), "{:?}", back.warnings);
     assert!((back.up - original.up).length() < 1e-15);

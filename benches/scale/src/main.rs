@@ -3,7 +3,6 @@
 use glam::{DVec3, Vec3};
 use relit::capture::mesh::Mesh;
 use relit::export::capture::write;
-use relit::export::exr::Precision;
 use relit::math::rng::Stream;
 use relit::room::Room;
 use relit::room::cameras::View;
@@ -37,7 +36,7 @@ fn main() {
         size: [32, 24],
     };
     let capture = room.photographed(&rendering).expect("the hall renders");
-    write(Path::new(out), &capture, Precision::Half).expect("the capture is written");
+    write(Path::new(out), &capture).expect("the capture is written");
     println!("{} {}", room.mesh.triangles.len(), room.mesh.objects.len());
 }
 

@@ -5,6 +5,9 @@ use crate::inverse::settings::{Preset, Settings};
 /// The part of path noise in an error where accuracy is asked for: without it the error would be 6 % less, with a half 13 %.
 pub const ACCURATE: f64 = 1.0 / 3.0;
 
+/// Paths of `preview`'s light field.
+const PREVIEW_PATHS: u64 = 400_000;
+
 /// Work and targets of a solve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Budget {
@@ -14,6 +17,9 @@ pub struct Budget {
     pub pixels: usize,
     /// Paths of the first stage, which end in measured radiance.
     pub light_field_paths: u64,
+    /// Greatest number of paths of a trial of outside light: `preview`'s number in all presets, which the benchmarks of scanned rooms
+    /// measure.
+    pub trial_paths: u64,
     /// Full paths of each round; zero ends the solve after the first stage.
     pub round_paths: u64,
     /// Greatest number of rounds.
@@ -56,6 +62,7 @@ impl Budget {
             };
             *round = settings.paths;
         }
+        budget.trial_paths = budget.trial_paths.min(budget.light_field_paths);
         budget
     }
 
@@ -65,7 +72,8 @@ impl Budget {
             Preset::Preview => Self {
                 gbuffer_pixels: 100_000,
                 pixels: 60_000,
-                light_field_paths: 400_000,
+                light_field_paths: PREVIEW_PATHS,
+                trial_paths: PREVIEW_PATHS,
                 round_paths: 0,
                 rounds: 0,
                 texture_rounds: 0,
@@ -79,6 +87,7 @@ impl Budget {
                 gbuffer_pixels: 400_000,
                 pixels: 120_000,
                 light_field_paths: 1_000_000,
+                trial_paths: PREVIEW_PATHS,
                 round_paths: 1_500_000,
                 rounds: 16,
                 texture_rounds: 16,
@@ -92,6 +101,7 @@ impl Budget {
                 gbuffer_pixels: 1_500_000,
                 pixels: 400_000,
                 light_field_paths: 2_000_000,
+                trial_paths: PREVIEW_PATHS,
                 round_paths: 3_000_000,
                 rounds: 100,
                 texture_rounds: 8,

@@ -3,6 +3,7 @@
 use crate::inverse::emitters::classify::{Change, classify};
 use crate::inverse::fit::errors::ScoreTest;
 use crate::inverse::fit::gauss_newton::Fit;
+use crate::inverse::known::Known;
 use crate::inverse::paths::PathCache;
 use crate::inverse::pipeline::fitting::role_under;
 use crate::inverse::pipeline::{Pipeline, Result};
@@ -78,11 +79,9 @@ impl Pipeline<'_, '_> {
         let mut was_emitter = vec![false; self.roles.len()];
         for _ in 0..MAX_CHANGES {
             let mut changes = classify(cache, &self.unknowns, &self.roles);
-            for change in &mut changes {
-                change.role = role_under(self.monitor.known.object(change.object), change.role);
-            }
-            // An object that became a reflector stays one, which ends oscillations; known roles do not change.
-            changes.retain(|c| !was_emitter[c.object] && c.role != self.roles[c.object]);
+            // An object that became a reflector stays one, which ends oscillations.
+            changes.retain(|change| !was_emitter[change.object]);
+            leave_possible(&mut changes, &self.roles, &self.monitor.known);
             if self.problem.scene.scanned {
                 leave_brightest(&mut changes);
             }
@@ -181,6 +180,14 @@ impl Pipeline<'_, '_> {
     }
 }
 
+/// Removes changes of roles that known values do not allow.
+fn leave_possible(changes: &mut Vec<Change>, roles: &[Role], known: &Known) {
+    for change in changes.iter_mut() {
+        change.role = role_under(known.object(change.object), change.role);
+    }
+    changes.retain(|change| change.role != roles[change.object]);
+}
+
 /// Removes all changes to emitters but the brightest one. Lamps of a scan are saturated, and so are surfaces beside them: once the
 /// lamp is as bright as the room tells, these may be explained by its light.
 fn leave_brightest(changes: &mut Vec<Change>) {
@@ -194,14 +201,33 @@ fn leave_brightest(changes: &mut Vec<Change>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::inverse::known::Pinned;
 
-    #[test]
-    fn of_the_new_lamps_of_a_scan_the_brightest_comes_first() {
-        let change = |object, role, value| Change {
+    fn change(object: usize, role: Role, value: f32) -> Change {
+        Change {
             object,
             role,
             value: Vec3::splat(value),
+        }
+    }
+
+    #[test]
+    fn a_segment_that_is_known_to_be_dark_does_not_keep_the_others_from_being_lamps() {
+        let mut known = Known::default();
+        let dark = Pinned {
+            emission: Some(Vec3::ZERO),
+            ..Pinned::default()
         };
+        known.set(0, dark);
+        let mut changes = vec![change(0, Role::Emitter, 9.0), change(1, Role::Emitter, 5.0)];
+        leave_possible(&mut changes, &[Role::Reflector; 2], &known);
+        leave_brightest(&mut changes);
+        assert_eq!(changes.len(), 1);
+        assert_eq!((changes[0].object, changes[0].role), (1, Role::Emitter));
+    }
+
+    #[test]
+    fn of_the_new_lamps_of_a_scan_the_brightest_comes_first() {
         let mut changes = vec![
             change(0, Role::Emitter, 2.0),
             change(1, Role::Reflector, 0.5),

@@ -73,6 +73,7 @@ impl Pipeline<'_, '_> {
     pub(super) fn weigh(&mut self, cache: &PathCache) -> Result {
         let residuals = cache.residuals(&self.unknowns);
         self.tell_model_error(&residuals);
+        self.tell_outside_share(cache, &residuals);
         self.robust = RobustWeights::from_residuals(&residuals, self.roles.len());
         let fitted = self.fit(cache)?;
         self.take(&fitted);

@@ -81,6 +81,8 @@ pub struct Pipeline<'a, 'o> {
     errors: StandardErrors,
     /// Variance of the model error, relative to reflected radiance.
     model_variance: f64,
+    /// Fraction of the light in the photographs that comes from outside.
+    outside_share: f64,
     /// The rough specular lobe of each object that has one.
     lobes: Vec<Option<Lobe>>,
     /// Exposures, vignetting and response, if any is needed.
@@ -165,6 +167,7 @@ pub fn solve(
             emission: vec![Vec3::INFINITY; surfaces],
         },
         model_variance: 0.0,
+        outside_share: 0.0,
         roles: vec![Role::Reflector; surfaces],
         robust: RobustWeights::even(surfaces),
         prior,

@@ -23,8 +23,8 @@ const ESCAPING: f64 = 1e-3;
 /// Least fall of the squared error by outside light, and then by a sun, relative to that without either; and by a scan's outside
 /// light without measurements.
 const OUTSIDE_GAIN: f64 = 0.03;
-/// Greatest number of paths of a trial: as many as the light field of `preview` has, which the benchmarks of scanned rooms measure.
-const TRIAL_PATHS: u64 = 400_000;
+/// Greatest number of times that a sun's direction is refined.
+const REFINEMENTS: usize = 2;
 /// Standard errors by which the squared error falls.
 const FALL_ERRORS: f64 = 4.0;
 /// Standard errors by which a sun's light exceeds zero, as usual for one unknown: the squared error decides about its direction.
@@ -92,7 +92,7 @@ impl Pipeline<'_, '_> {
             self.light_through_windows(field)?
         };
         // The chosen light is fitted to as many paths as the light field.
-        if self.open && self.trial_paths() < self.budget.light_field_paths {
+        if self.open && self.budget.trial_paths < self.budget.light_field_paths {
             let paths = self.paths_of(field, self.budget.light_field_paths)?;
             self.weigh(&paths)?;
         }
@@ -189,13 +189,19 @@ impl Pipeline<'_, '_> {
         self.go_back_to(without);
         let sky = plain.found.sky.clone();
         let anew = self.fit_open(sky, self.outside.surroundings, sun, field)?;
-        let sunny = match added {
+        let mut sunny = match added {
             Some(added) if added.misfit.mean() < anew.misfit.mean() => {
                 self.go_back_to(added.found.clone());
                 added
             }
             _ => anew,
         };
+        for _ in 0..REFINEMENTS {
+            let Some(refined) = self.move_sun(&sunny, field)? else {
+                break;
+            };
+            sunny = refined;
+        }
         let fall = plain.misfit.mean() - sunny.misfit.mean();
         Ok(match fall > needed && self.sun_shines() {
             true => sunny,
@@ -212,11 +218,29 @@ impl Pipeline<'_, '_> {
         self.roles[surface] = Role::Unseen;
         self.unknowns.emission[surface] = mean_radiance(&self.clusters);
         self.robust = RobustWeights::even(self.roles.len());
-        let paths = self.paths_of(field, self.trial_paths())?;
+        let paths = self.paths_of(field, self.budget.trial_paths)?;
         let fitted = self.fit(&paths)?;
         self.settle_roles(&paths, fitted)?;
         self.weigh(&paths)?;
         self.trial(Some(paths), field.cache)
+    }
+
+    /// Moves the sun of the present fit to where it explains the photographs better, if that lowers the squared error.
+    fn move_sun(&mut self, sunny: &Trial, field: LightField) -> Result<Option<Trial>> {
+        let sun = self.refine_sun(sunny.paths.as_ref().unwrap_or(field.cache));
+        if sun == self.outside.sun {
+            return Ok(None);
+        }
+        self.outside.sun = sun;
+        let paths = self.paths_of(field, self.budget.trial_paths)?;
+        let fitted = self.fit(&paths)?;
+        self.settle_roles(&paths, fitted)?;
+        let moved = self.trial(Some(paths), field.cache)?;
+        if moved.misfit.mean() < sunny.misfit.mean() {
+            return Ok(Some(moved));
+        }
+        self.go_back_to(sunny.found.clone());
+        Ok(None)
     }
 
     /// Where the sun stands, for reports; empty without one.
@@ -250,7 +274,7 @@ impl Pipeline<'_, '_> {
         let as_stored = self.sky.is_none() && surroundings == Surroundings::Far && sun.is_none();
         let paths = match as_stored {
             true => None,
-            false => Some(self.paths_of(field, self.trial_paths())?),
+            false => Some(self.paths_of(field, self.budget.trial_paths)?),
         };
         self.tell_lamps(paths.as_ref().unwrap_or(field.cache), Role::Unseen)?;
         self.trial(paths, field.cache)
@@ -260,10 +284,6 @@ impl Pipeline<'_, '_> {
     fn paths_of(&mut self, field: LightField, count: u64) -> Result<PathCache> {
         let (paths, _) = self.stored(field.lights, Some(field.measured), 0, count)?;
         Ok(paths)
-    }
-
-    fn trial_paths(&self) -> u64 {
-        self.budget.light_field_paths.min(TRIAL_PATHS)
     }
 
     /// Fits again with the expected colours of outside light. `paths` replace the stored ones of `cache`.

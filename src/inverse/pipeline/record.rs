@@ -3,9 +3,11 @@
 use crate::calibrate::exposure::Exposures;
 use crate::inverse::fit::model_error;
 use crate::inverse::loss::LateLight;
+use crate::inverse::paths::PathCache;
 use crate::inverse::paths::evaluate::Linearised;
 use crate::inverse::pipeline::{MAX_DEPTH, Pipeline, Result, STAGES, describe};
 use crate::inverse::solver::{Checkpoint, Solution, Stage, Termination};
+use crate::math::color::luminance_f64;
 use glam::{DVec2, Vec3};
 
 /// A common fixed depth, in bounces.
@@ -14,7 +16,8 @@ const COMMON_DEPTH: u32 = 10;
 impl Pipeline<'_, '_> {
     pub(super) fn describe(&mut self) {
         self.estimate = self.fitted_estimate();
-        model_error::add_to(&mut self.estimate, &self.roles, self.model_variance);
+        let (variance, share) = (self.model_variance, self.outside_share);
+        model_error::add_to(&mut self.estimate, &self.roles, variance, share);
         model_error::add_gloss(&mut self.estimate, &self.roles);
         // One known albedo settles the factor.
         let settled = (self.monitor.known.objects()).any(|(_, known)| known.albedo.is_some());
@@ -43,6 +46,27 @@ impl Pipeline<'_, '_> {
             &self.unknowns,
             textured.unwrap_or(&[]),
         );
+    }
+
+    /// Sets how much of the light in the photographs comes from outside. In scans it stays zero: the factor that their albedos share
+    /// holds the errors of this light.
+    pub(super) fn tell_outside_share(&mut self, cache: &PathCache, residuals: &[Linearised]) {
+        if self.problem.scene.scanned {
+            return;
+        }
+        let mut dark = self.unknowns.clone();
+        dark.emission[self.outside.first as usize..].fill(Vec3::ZERO);
+        let (mut outside, mut all) = (0.0, 0.0);
+        for (lit, dark) in residuals.iter().zip(cache.residuals(&dark)) {
+            outside += luminance_f64(dark.residual() - lit.residual()) * lit.pixels;
+        }
+        for cluster in &self.clusters {
+            all += luminance_f64(cluster.measured.as_dvec3()) * cluster.pixels.len() as f64;
+        }
+        self.outside_share = match all > 0.0 {
+            true => (outside / all).clamp(0.0, 1.0),
+            false => 0.0,
+        };
     }
 
     /// Adds the losses of the present estimate to the loss curve, and returns them: in the fit, and held out.

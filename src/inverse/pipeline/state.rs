@@ -32,6 +32,9 @@ pub struct SolverState {
     /// Variance of the model error, relative to reflected radiance.
     #[serde(default)]
     model_variance: f64,
+    /// Fraction of the light in the photographs that comes from outside.
+    #[serde(default)]
+    outside_share: f64,
     #[serde(deserialize_with = "nullable::all_or_infinity")]
     albedo_errors: Vec<Vec3>,
     #[serde(deserialize_with = "nullable::all_or_infinity")]
@@ -69,6 +72,7 @@ impl Pipeline<'_, '_> {
             roles: self.roles.clone(),
             unknowns: self.unknowns.clone(),
             model_variance: self.model_variance,
+            outside_share: self.outside_share,
             albedo_errors: self.errors.albedo.clone(),
             emission_errors: self.errors.emission.clone(),
             lobes: lobes
@@ -93,6 +97,7 @@ impl Pipeline<'_, '_> {
         self.roles = state.roles;
         self.unknowns = state.unknowns;
         self.model_variance = state.model_variance;
+        self.outside_share = state.outside_share;
         self.errors = StandardErrors {
             albedo: state.albedo_errors,
             emission: state.emission_errors,

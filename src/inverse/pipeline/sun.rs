@@ -36,6 +36,14 @@ const SKIES: std::ops::RangeInclusive<i32> = -1..=4;
 /// Least fall of χ² of a sun: five standard errors, and 2 ln of the number of candidates that it is the best of.
 const MIN_FALL: f64 = 25.0 + 20.0;
 
+/// Columns of the maps in which the direction of a fitted sun is refined, and how far from it candidates are, in their pixels.
+const FINE_COLUMNS: [usize; 2] = [512, 1024];
+const FINE_REACH: f32 = 5.0;
+/// Clusters that a fitted sun is refined with, at most.
+const FINE_CLUSTERS: usize = 8192;
+/// Irradiances that are tried with each direction, over that of the fitted sun: powers of the eighth root of two.
+const FINE_IRRADIANCES: std::ops::RangeInclusive<i32> = -4..=4;
+
 /// One cluster of pixels, reduced to what the search needs.
 struct Patch {
     object: usize,
@@ -126,6 +134,17 @@ impl Search<'_> {
         (suns.map(brightest).fold(f64::INFINITY, f64::min), without)
     }
 
+    /// Least χ² of a sun in a direction with about an irradiance over π.
+    fn misfit_near(&self, towards: Vec3, irradiance: f64) -> f64 {
+        let step = self.patches.len().div_ceil(FINE_CLUSTERS).max(1);
+        let patches: Vec<(&Patch, f64)> = (self.patches.iter().step_by(step))
+            .map(|patch| (patch, patch.cosine(self.scene, self.sky, towards)))
+            .collect();
+        FINE_IRRADIANCES
+            .map(|step| self.misfit(&patches, 0.0, irradiance * 2f64.powf(f64::from(step) / 8.0)))
+            .fold(f64::INFINITY, f64::min)
+    }
+
     /// χ² with a sky of a radiance and a sun of an irradiance over π, where each object has the albedo that fits best.
     fn misfit(&self, patches: &[(&Patch, f64)], sky: f64, sun: f64) -> f64 {
         let precision = f64::from(UNSEEN_DEVIATION).powi(-2);
@@ -188,22 +207,52 @@ impl Pipeline<'_, '_> {
         if self.monitor.settings.light_sampling == LightSampling::Bsdf {
             return None;
         }
-        let scene = &*self.problem.scene;
-        // Into a scan that no photograph looks out of, no sun shines.
-        if scene.scanned && self.sky.is_none() {
-            return None;
-        }
-        let objects = scene.objects.len();
+        let objects = self.problem.scene.objects.len();
         // All objects are reflectors of one albedo, under a black sky and under a white one.
-        let residuals = [0.0, 1.0].map(|sky| {
+        let assumed = [0.0, 1.0].map(|sky| {
             let mut assumed: Unknowns = self.unknowns.clone();
             for k in (0..objects).filter(|&k| self.gbuffer.seen[k] > 0) {
                 assumed.albedo[k] = Vec3::splat(ALBEDO_MEAN);
                 assumed.emission[k] = Vec3::ZERO;
             }
             assumed.emission[objects..].fill(Vec3::splat(sky));
-            cache.residuals(&assumed)
+            assumed
         });
+        let search = self.search(cache, assumed.each_ref());
+        let far = (self.sky.as_ref()).filter(|_| self.outside.surroundings == Surroundings::Far);
+        let may_hold = |d: Vec3| {
+            far.is_none_or(|sky| sky.at(Vec3::ZERO, d).is_none() || sky.is_bound(Vec3::ZERO, d))
+        };
+        let (direction, fall) = search.best(self.problem.scene.up, may_hold)?;
+        (fall >= MIN_FALL).then_some(direction)
+    }
+
+    /// The direction near the present sun that explains the photographs best, with the rest of the light as fitted.
+    pub(super) fn refine_sun(&self, cache: &PathCache) -> Option<Vec3> {
+        let sun = self.outside.sun?;
+        let surface = self.outside.sun_surface() as usize;
+        let irradiance = luminance_f64(self.unknowns.emission[surface].as_dvec3());
+        let mut without = self.unknowns.clone();
+        without.emission[surface] = Vec3::ZERO;
+        let search = self.search(cache, [&without; 2]);
+        let mut best = sun;
+        for columns in FINE_COLUMNS {
+            let reach = (FINE_REACH * std::f32::consts::TAU / columns as f32).cos();
+            let candidates: Vec<Vec3> = (directions(columns))
+                .filter(|d| d.dot(best) >= reach && d.dot(self.problem.scene.up) > 0.0)
+                .collect();
+            let ranked = (candidates.into_par_iter().chain([best]))
+                .map(|d| (d, search.misfit_near(d, irradiance)))
+                .min_by(|a, b| a.1.total_cmp(&b.1));
+            best = ranked?.0;
+        }
+        Some(best)
+    }
+
+    /// The clusters of seen reflectors, in the light of two assumed states: under a black sky and a white one.
+    fn search(&self, cache: &PathCache, assumed: [&Unknowns; 2]) -> Search<'_> {
+        let scene = &*self.problem.scene;
+        let residuals = assumed.map(|assumed| cache.residuals(assumed));
         let mut patches: Vec<Patch> = (cache.clusters.iter().enumerate())
             .filter_map(|(i, cached)| {
                 let cluster = &cached.cluster;
@@ -213,20 +262,12 @@ impl Pipeline<'_, '_> {
             })
             .collect();
         patches.sort_by_key(|patch| patch.object);
-        let sky = self.sky.as_ref();
         let sum: f64 = patches.iter().map(|patch| patch.measured).sum();
-        let search = Search {
+        Search {
             level: sum / patches.len().max(1) as f64,
             scene,
-            sky,
+            sky: self.sky.as_ref(),
             patches,
-        };
-        // A photograph that looks into a direction far away shows no sun there, unless it saturates.
-        let far = sky.filter(|_| self.outside.surroundings == Surroundings::Far);
-        let may_hold = |d: Vec3| {
-            far.is_none_or(|sky| sky.at(Vec3::ZERO, d).is_none() || sky.is_bound(Vec3::ZERO, d))
-        };
-        let (direction, fall) = search.best(scene.up, may_hold)?;
-        (fall >= MIN_FALL).then_some(direction)
+        }
     }
 }

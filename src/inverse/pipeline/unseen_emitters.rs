@@ -1,9 +1,10 @@
 //! Finds lamps that no photograph sees, by their effect on the room.
 //!
 //! The light field determines the exitant radiance of an unseen surface, but not whether it is emitted or reflected. Full paths
-//! do: only the right lamps explain the photographs with consistent albedos. All unseen objects are candidates. Those with the
-//! best score tests are tried, each with its own paths and a refit of everything. The one with the smallest residuals is
-//! accepted, and the search is repeated until no candidate reduces the residuals significantly.
+//! do: only the right lamps explain the photographs with consistent albedos. All unseen objects are candidates. Everything is refitted
+//! with each of those with the best score tests: first on stored paths, then, for those with the smallest residuals, on paths of
+//! its own. The one with the smallest residuals is accepted, and the search is repeated until no candidate reduces the residuals
+//! significantly.
 
 use crate::inverse::fit::errors::ScoreTest;
 use crate::inverse::fit::gauss_newton::Fit;
@@ -19,8 +20,11 @@ use crate::transport::emitters::Emitters;
 use glam::{DVec3, Vec3};
 
 const MAX_LAMPS: usize = 24;
-/// Greatest number of candidates tried per score test: in the first iteration, which has two tests, and later.
-const MAX_TRIED: [usize; 2] = [4, 2];
+/// Greatest number of candidates of a score test that are fitted to the stored paths. A score test ranks large surfaces before
+/// small lamps, since it is linear.
+const MAX_FITTED: usize = 8;
+/// Greatest number of candidates that are fitted to paths of their own: in the first iteration, and later.
+const MAX_TRACED: [usize; 2] = [4, 2];
 /// Least gain of a candidate, relative to the best one.
 const PROMISING: f64 = 0.2;
 /// Least decrease of the mean residual over clusters, in standard errors.
@@ -88,7 +92,7 @@ impl Pipeline<'_, '_> {
         self.robust = RobustWeights::even(self.roles.len());
         let mut found = false;
         for iteration in 0..MAX_LAMPS {
-            let promising = self.promising(&explored, &candidates, anew && iteration == 0);
+            let promising = self.promising(&explored, &candidates, anew && iteration == 0)?;
             if promising.is_empty() {
                 break;
             }
@@ -106,15 +110,15 @@ impl Pipeline<'_, '_> {
         Ok(found)
     }
 
-    /// The candidates with the best score tests: with all parameters active, and at first also with emissions alone.
+    /// The candidates with the smallest residuals after a fit to the stored paths, of those with the best score tests: with all
+    /// parameters active, and at first also with emissions alone.
     fn promising(
-        &self,
+        &mut self,
         explored: &PathCache,
         candidates: &[usize],
         at_first: bool,
-    ) -> Vec<ScoreTest> {
+    ) -> Result<Vec<ScoreTest>> {
         let surfaces = self.roles.len();
-        let max_tried = MAX_TRIED[usize::from(!at_first)];
         let mut promising: Vec<ScoreTest> = Vec::new();
         let all = self.free();
         let light: Vec<usize> = all.iter().copied().filter(|&i| i >= surfaces).collect();
@@ -126,12 +130,39 @@ impl Pipeline<'_, '_> {
                 .collect();
             tests.sort_by(|a, b| b.gain().total_cmp(&a.gain()).then(a.index.cmp(&b.index)));
             let max_gain = tests.first().map_or(0.0, ScoreTest::gain);
-            tests.truncate(max_tried);
+            tests.truncate(MAX_FITTED);
             let is_new = |test: &ScoreTest| promising.iter().all(|p| p.index != test.index);
             tests.retain(|test| test.gain() > PROMISING * max_gain && is_new(test));
             promising.extend(tests);
         }
-        promising
+        let traced = MAX_TRACED[usize::from(!at_first)];
+        if promising.len() <= traced {
+            return Ok(promising);
+        }
+        let mut fitted = Vec::new();
+        for test in promising {
+            let with_lamp = self.with_lamp(&test, |pipeline| pipeline.fit(explored))?;
+            let residuals = residuals(explored, &with_lamp.unknowns);
+            fitted.push((residuals.iter().sum::<f64>(), test));
+        }
+        fitted.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.index.cmp(&b.1.index)));
+        fitted.truncate(traced);
+        Ok(fitted.into_iter().map(|(_, test)| test).collect())
+    }
+
+    /// Does something with a candidate as a lamp, then goes back to the state before.
+    fn with_lamp<T>(
+        &mut self,
+        candidate: &ScoreTest,
+        with: impl FnOnce(&mut Self) -> Result<T>,
+    ) -> Result<T> {
+        let k = candidate.index - self.roles.len();
+        let before: (Vec<Role>, Unknowns) = (self.roles.clone(), self.unknowns.clone());
+        self.roles[k] = Role::Unseen;
+        self.unknowns.emission[k] = candidate.step.max(DVec3::ZERO).as_vec3();
+        let result = with(self);
+        (self.roles, self.unknowns) = before;
+        result
     }
 
     /// Fits each candidate from the present unknowns; returns the one with the largest significant decrease of the residuals
@@ -142,20 +173,14 @@ impl Pipeline<'_, '_> {
         present: &Hypothesis,
         paths: u64,
     ) -> Result<Option<(usize, Hypothesis)>> {
-        let surfaces = self.roles.len();
-        let before: (Vec<Role>, Unknowns) = (self.roles.clone(), self.unknowns.clone());
         let mut best: Option<(f64, usize, Hypothesis)> = None;
         for test in promising {
-            let k = test.index - surfaces;
-            self.roles[k] = Role::Unseen;
-            self.unknowns.emission[k] = test.step.max(DVec3::ZERO).as_vec3();
-            let tried = self.hypothesis(paths)?;
+            let tried = self.with_lamp(test, |pipeline| pipeline.hypothesis(paths))?;
             if let Some(decrease) = present.decrease_to(&tried)
                 && best.as_ref().is_none_or(|(max, ..)| decrease > *max)
             {
-                best = Some((decrease, k, tried));
+                best = Some((decrease, test.index - self.roles.len(), tried));
             }
-            (self.roles, self.unknowns) = before.clone();
         }
         Ok(best.map(|(_, k, tried)| (k, tried)))
     }
@@ -165,15 +190,19 @@ impl Pipeline<'_, '_> {
         let lights = self.lights();
         let (cache, _) = self.stored(&lights, None, 6, paths)?;
         let fitted = self.fit(&cache)?;
-        let clusters = cache.residuals(&fitted.unknowns);
-        let size = |cluster: &Linearised| {
-            let weight = cluster.weight_now();
-            (weight.powf(0.5) * cluster.residual().abs()).element_sum()
-        };
         Ok(Hypothesis {
-            residuals: clusters.iter().map(size).collect(),
+            residuals: residuals(&cache, &fitted.unknowns),
             cache,
             fitted,
         })
     }
+}
+
+/// Absolute residual of each cluster, relative to its level.
+fn residuals(cache: &PathCache, unknowns: &Unknowns) -> Vec<f64> {
+    let size = |cluster: Linearised| {
+        let weight = cluster.weight_now();
+        (weight.powf(0.5) * cluster.residual().abs()).element_sum()
+    };
+    cache.residuals(unknowns).into_iter().map(size).collect()
 }

@@ -17,11 +17,16 @@ mod window;
 pub use photographed::Generated;
 
 use crate::error::Result;
-use crate::room::Room;
+use crate::export::capture as folder;
+use crate::export::exr::{Precision, write_rgb};
+use crate::export::new_folder::NewFolder;
+use crate::math::picture::Picture;
 use crate::room::photographs::{self, Rendering};
+use crate::room::{Room, write_truth};
 use furnisher::Furnisher;
 use photographed::Draft;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// A kind of generated room. Its number is a key of the random numbers of its rooms.
 #[derive(
@@ -84,6 +89,33 @@ fn draft(family: Family, seed: u64, size: [u32; 2]) -> Draft {
 pub fn generate(seed: u64, size: [u32; 2]) -> (Room, Rendering) {
     let plain = draft(Family::Plain, seed, size);
     (plain.room, plain.rendering)
+}
+
+/// Writes room `seed` of a family into a new or empty folder, atomically: transforms.json, mesh.obj, images, and truth.json and
+/// truth/albedo_NNN.exr where the mesh is the room's own.
+///
+/// # Errors
+/// The room cannot be generated (see [`Family::generate`]), the folder is not empty, or a file cannot be written.
+pub fn write(out: &Path, family: Family, seed: u64, size: [u32; 2]) -> Result<()> {
+    let new = NewFolder::new(out)?;
+    let rendering = draft(family, seed, size).rendering;
+    let room = family.generate(seed, size)?;
+    folder::write(new.path(), &room.capture)?;
+    if room.capture.segmentation.is_none() {
+        write_truth(new.path(), &room.capture.name, &room.lit, &rendering)?;
+    }
+    if let Some(outside) = &room.lit.outside {
+        let [width, height] = outside.size().map(|side| side as u32);
+        let pixels = outside.pixels().to_vec();
+        let picture = Picture {
+            width,
+            height,
+            pixels,
+        };
+        let path = new.path().join("truth/outside.exr");
+        write_rgb(&path, &picture, Precision::Float)?;
+    }
+    new.commit()
 }
 
 impl Family {
