@@ -20,7 +20,7 @@ const MAX_RELATIVE: f64 = 0.5;
 /// would be right.
 const SHARED: f64 = 2.0;
 
-/// Relative error of albedos where all light comes from outside. Between windows only a few directions are measured, and a sun stands a
+/// Relative error of albedos where all light comes from outside and none of it was measured there. Between windows only a few directions are measured, and a sun stands a
 /// degree or two beside the true one, which shifts the albedo of whole objects and leaves no residuals. The albedos of `relit trade
 /// --rooms 8 --family window --preset balanced` are off by 3 % (mean), 4 % as a standard error.
 const OUTSIDE: f64 = 0.04;
@@ -69,7 +69,7 @@ pub fn variance(
 }
 
 /// Adds the model error to the standard errors of albedos, and of the emission of unseen lamps. `outside` is the fraction of the light
-/// that comes from outside.
+/// that comes from outside and was not measured there.
 pub fn add_to(estimate: &mut Estimate, roles: &[Role], variance: f64, outside: f64) {
     let relative = (SHARED * variance.sqrt()).hypot(OUTSIDE * outside) as f32;
     add_to_albedos(estimate, roles, relative);

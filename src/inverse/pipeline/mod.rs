@@ -81,7 +81,7 @@ pub struct Pipeline<'a, 'o> {
     errors: StandardErrors,
     /// Variance of the model error, relative to reflected radiance.
     model_variance: f64,
-    /// Fraction of the light in the photographs that comes from outside.
+    /// Fraction of the light in the photographs that comes from outside and was not measured there, as the sun is not.
     outside_share: f64,
     /// The rough specular lobe of each object that has one.
     lobes: Vec<Option<Lobe>>,

@@ -32,7 +32,7 @@ pub struct SolverState {
     /// Variance of the model error, relative to reflected radiance.
     #[serde(default)]
     model_variance: f64,
-    /// Fraction of the light in the photographs that comes from outside.
+    /// Fraction of the light in the photographs that comes from outside and was not measured there, as the sun is not.
     #[serde(default)]
     outside_share: f64,
     #[serde(deserialize_with = "nullable::all_or_infinity")]

@@ -219,6 +219,7 @@ impl Pipeline<'_, '_> {
             assumed
         });
         let search = self.search(cache, assumed.each_ref());
+        // A photograph that looks into a direction far away shows no sun there, unless it saturates.
         let far = (self.sky.as_ref()).filter(|_| self.outside.surroundings == Surroundings::Far);
         let may_hold = |d: Vec3| {
             far.is_none_or(|sky| sky.at(Vec3::ZERO, d).is_none() || sky.is_bound(Vec3::ZERO, d))
@@ -249,7 +250,7 @@ impl Pipeline<'_, '_> {
         Some(best)
     }
 
-    /// The clusters of seen reflectors, in the light of two assumed states: under a black sky and a white one.
+    /// The clusters of seen reflectors, lit as in two assumed states. What they get more in the second one is a sky's light.
     fn search(&self, cache: &PathCache, assumed: [&Unknowns; 2]) -> Search<'_> {
         let scene = &*self.problem.scene;
         let residuals = assumed.map(|assumed| cache.residuals(assumed));
