@@ -48,6 +48,7 @@ pub(super) struct Found {
     prior: Prior,
     sun: Option<Vec3>,
     open: bool,
+    outside_share: f64,
     sky: Option<MeasuredOutside>,
 }
 
@@ -307,6 +308,7 @@ impl Pipeline<'_, '_> {
             prior: self.prior.clone(),
             sun: self.outside.sun,
             open: self.open,
+            outside_share: self.outside_share,
             sky: self.sky.clone(),
         }
     }
@@ -319,6 +321,7 @@ impl Pipeline<'_, '_> {
         self.prior = found.prior;
         self.outside.sun = found.sun;
         self.open = found.open;
+        self.outside_share = found.outside_share;
         self.sky = found.sky;
     }
 

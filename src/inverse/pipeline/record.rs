@@ -51,7 +51,8 @@ impl Pipeline<'_, '_> {
     /// Sets how much of the light in the photographs comes from outside and was not measured there; by paths of the light field, which
     /// end in measured light, how much of it arrives directly. In scans it stays zero: the factor that their albedos share holds the errors of this light.
     pub(super) fn tell_outside_share(&mut self, cache: &PathCache, residuals: &[Linearised]) {
-        if self.problem.scene.scanned {
+        if self.problem.scene.scanned || !self.open {
+            self.outside_share = 0.0;
             return;
         }
         let mut dark = self.unknowns.clone();

@@ -115,11 +115,16 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
+    /// Every `step`-th patch, with the cosine of a sun's light in a direction.
+    fn with_cosines(&self, towards: Vec3, step: usize) -> Vec<(&Patch, f64)> {
+        (self.patches.iter().step_by(step))
+            .map(|patch| (patch, patch.cosine(self.scene, self.sky, towards)))
+            .collect()
+    }
+
     /// Least χ² over the tried irradiances of a sun in a direction, over every `step`-th patch; and without a sun.
     fn misfits(&self, towards: Vec3, step: usize) -> (f64, f64) {
-        let patches: Vec<(&Patch, f64)> = (self.patches.iter().step_by(step))
-            .map(|patch| (patch, patch.cosine(self.scene, self.sky, towards)))
-            .collect();
+        let patches = self.with_cosines(towards, step);
         let brightest = |sun: f64| {
             let skies = SKIES.map(|power| self.level * 4f64.powi(power));
             (std::iter::once(0.0).chain(skies))
@@ -137,9 +142,7 @@ impl Search<'_> {
     /// Least χ² of a sun in a direction with about an irradiance over π.
     fn misfit_near(&self, towards: Vec3, irradiance: f64) -> f64 {
         let step = self.patches.len().div_ceil(FINE_CLUSTERS).max(1);
-        let patches: Vec<(&Patch, f64)> = (self.patches.iter().step_by(step))
-            .map(|patch| (patch, patch.cosine(self.scene, self.sky, towards)))
-            .collect();
+        let patches = self.with_cosines(towards, step);
         FINE_IRRADIANCES
             .map(|step| self.misfit(&patches, 0.0, irradiance * 2f64.powf(f64::from(step) / 8.0)))
             .fold(f64::INFINITY, f64::min)
@@ -209,16 +212,16 @@ impl Pipeline<'_, '_> {
         }
         let objects = self.problem.scene.objects.len();
         // All objects are reflectors of one albedo, under a black sky and under a white one.
-        let assumed = [0.0, 1.0].map(|sky| {
+        let residuals = [0.0, 1.0].map(|sky| {
             let mut assumed: Unknowns = self.unknowns.clone();
             for k in (0..objects).filter(|&k| self.gbuffer.seen[k] > 0) {
                 assumed.albedo[k] = Vec3::splat(ALBEDO_MEAN);
                 assumed.emission[k] = Vec3::ZERO;
             }
             assumed.emission[objects..].fill(Vec3::splat(sky));
-            assumed
+            cache.residuals(&assumed)
         });
-        let search = self.search(cache, assumed.each_ref());
+        let search = self.search(cache, residuals.each_ref());
         // A photograph that looks into a direction far away shows no sun there, unless it saturates.
         let far = (self.sky.as_ref()).filter(|_| self.outside.surroundings == Surroundings::Far);
         let may_hold = |d: Vec3| {
@@ -235,7 +238,7 @@ impl Pipeline<'_, '_> {
         let irradiance = luminance_f64(self.unknowns.emission[surface].as_dvec3());
         let mut without = self.unknowns.clone();
         without.emission[surface] = Vec3::ZERO;
-        let search = self.search(cache, [&without; 2]);
+        let search = self.search(cache, [&cache.residuals(&without); 2]);
         let mut best = sun;
         for columns in FINE_COLUMNS {
             let reach = (FINE_REACH * std::f32::consts::TAU / columns as f32).cos();
@@ -251,14 +254,13 @@ impl Pipeline<'_, '_> {
     }
 
     /// The clusters of seen reflectors, lit as in two assumed states. What they get more in the second one is a sky's light.
-    fn search(&self, cache: &PathCache, assumed: [&Unknowns; 2]) -> Search<'_> {
+    fn search(&self, cache: &PathCache, residuals: [&Vec<Linearised>; 2]) -> Search<'_> {
         let scene = &*self.problem.scene;
-        let residuals = assumed.map(|assumed| cache.residuals(assumed));
         let mut patches: Vec<Patch> = (cache.clusters.iter().enumerate())
             .filter_map(|(i, cached)| {
                 let cluster = &cached.cluster;
                 let reflects = self.roles[cluster.object as usize] == Role::Reflector;
-                let radiances = residuals.each_ref().map(|of_sky| &of_sky[i]);
+                let radiances = residuals.map(|of_state| &of_state[i]);
                 reflects.then(|| Patch::new(scene, cluster, radiances))?
             })
             .collect();

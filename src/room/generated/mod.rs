@@ -91,15 +91,30 @@ pub fn generate(seed: u64, size: [u32; 2]) -> (Room, Rendering) {
     (plain.room, plain.rendering)
 }
 
-/// Writes room `seed` of a family into a new or empty folder, atomically: transforms.json, mesh.obj, images, and truth.json and
-/// truth/albedo_NNN.exr where the mesh is the room's own.
+/// Photographs a room as its family is photographed. Fails as [`Family::generate`] does.
+fn photographed(draft: Draft) -> Result<Generated> {
+    match draft.family {
+        Family::Sparse => sparse::photograph(draft),
+        Family::Phone => phone::photograph(draft),
+        Family::Scanned => scanned::scan(draft),
+        _ => {
+            let lit = draft.lit()?;
+            let taken = photographs::render_lit(&lit, &draft.rendering);
+            Ok(draft.photographed(lit, taken))
+        }
+    }
+}
+
+/// Writes room `seed` of a family into a new or empty folder, atomically: transforms.json, mesh.obj, images, truth/outside.exr if it
+/// has light from outside, and truth.json and truth/albedo_NNN.exr where the mesh is the room's own.
 ///
 /// # Errors
 /// The room cannot be generated (see [`Family::generate`]), the folder is not empty, or a file cannot be written.
 pub fn write(out: &Path, family: Family, seed: u64, size: [u32; 2]) -> Result<()> {
     let new = NewFolder::new(out)?;
-    let rendering = draft(family, seed, size).rendering;
-    let room = family.generate(seed, size)?;
+    let draft = draft(family, seed, size);
+    let rendering = draft.rendering;
+    let room = photographed(draft)?;
     folder::write(new.path(), &room.capture)?;
     if room.capture.segmentation.is_none() {
         write_truth(new.path(), &room.capture.name, &room.lit, &rendering)?;
@@ -162,16 +177,6 @@ impl Family {
     /// # Errors
     /// A temporary file cannot be written (`scanned`), or photographs of this size see no surface.
     pub fn generate(self, seed: u64, size: [u32; 2]) -> Result<Generated> {
-        let draft = draft(self, seed, size);
-        match self {
-            Self::Sparse => sparse::photograph(draft),
-            Self::Phone => phone::photograph(draft),
-            Self::Scanned => scanned::scan(draft),
-            _ => {
-                let lit = draft.lit()?;
-                let taken = photographs::render_lit(&lit, &draft.rendering);
-                Ok(draft.photographed(lit, taken))
-            }
-        }
+        photographed(draft(self, seed, size))
     }
 }
