@@ -2,8 +2,8 @@
 //!
 //! The light field determines the exitant radiance of an unseen surface, but not whether it is emitted or reflected. Full paths
 //! do: only the right lamps explain the photographs with consistent albedos. All unseen objects are candidates. Everything is refitted
-//! with each of those with the best score tests: first on stored paths, then, for those with the smallest residuals, on paths of
-//! its own. The one with the smallest residuals is accepted, and the search is repeated until no candidate reduces the residuals
+//! with each of those with the best score tests, on paths of its own: first on a few, then, for those with the smallest residuals,
+//! on more. The one with the smallest residuals is accepted, and the search is repeated until no candidate reduces the residuals
 //! significantly.
 
 use crate::inverse::fit::errors::ScoreTest;
@@ -20,17 +20,19 @@ use crate::transport::emitters::Emitters;
 use glam::{DVec3, Vec3};
 
 const MAX_LAMPS: usize = 24;
-/// Greatest number of candidates of a score test that are fitted to the stored paths. A score test ranks large surfaces before
-/// small lamps, since it is linear.
-const MAX_FITTED: usize = 8;
-/// Greatest number of candidates that are fitted to paths of their own: in the first iteration, and later.
-const MAX_TRACED: [usize; 2] = [4, 2];
+/// Greatest number of candidates of a score test that are fitted to a few paths. A score test ranks large surfaces before small
+/// lamps: it is linear, and its paths are shared by all candidates, so that few of them meet a small one.
+const MAX_ROUGH: usize = 8;
+/// Greatest number of candidates that are fitted to all paths of a trial: in the first iteration, and later.
+const MAX_TRIALS: [usize; 2] = [4, 2];
 /// Least gain of a candidate, relative to the best one.
 const PROMISING: f64 = 0.2;
 /// Least decrease of the mean residual over clusters, in standard errors.
 const MIN_DECREASE: f64 = 5.0;
 /// Paths of a round over the paths of the search, and of each trial.
 const PATHS_DIVISOR: u64 = 4;
+/// Paths of a trial over those of a rough one.
+const ROUGH_DIVISOR: u64 = 4;
 
 /// A set of lamps with everything fitted to it.
 struct Hypothesis {
@@ -92,7 +94,8 @@ impl Pipeline<'_, '_> {
         self.robust = RobustWeights::even(self.roles.len());
         let mut found = false;
         for iteration in 0..MAX_LAMPS {
-            let promising = self.promising(&explored, &candidates, anew && iteration == 0)?;
+            let promising =
+                self.promising(&explored, &candidates, anew && iteration == 0, paths)?;
             if promising.is_empty() {
                 break;
             }
@@ -110,13 +113,14 @@ impl Pipeline<'_, '_> {
         Ok(found)
     }
 
-    /// The candidates with the smallest residuals after a fit to the stored paths, of those with the best score tests: with all
+    /// The candidates with the smallest residuals after a fit to a few paths, of those with the best score tests: with all
     /// parameters active, and at first also with emissions alone.
     fn promising(
         &mut self,
         explored: &PathCache,
         candidates: &[usize],
         at_first: bool,
+        paths: u64,
     ) -> Result<Vec<ScoreTest>> {
         let surfaces = self.roles.len();
         let mut promising: Vec<ScoreTest> = Vec::new();
@@ -130,23 +134,22 @@ impl Pipeline<'_, '_> {
                 .collect();
             tests.sort_by(|a, b| b.gain().total_cmp(&a.gain()).then(a.index.cmp(&b.index)));
             let max_gain = tests.first().map_or(0.0, ScoreTest::gain);
-            tests.truncate(MAX_FITTED);
+            tests.truncate(MAX_ROUGH);
             let is_new = |test: &ScoreTest| promising.iter().all(|p| p.index != test.index);
             tests.retain(|test| test.gain() > PROMISING * max_gain && is_new(test));
             promising.extend(tests);
         }
-        let traced = MAX_TRACED[usize::from(!at_first)];
-        if promising.len() <= traced {
+        let trials = MAX_TRIALS[usize::from(!at_first)];
+        if promising.len() <= trials {
             return Ok(promising);
         }
         let mut fitted = Vec::new();
         for test in promising {
-            let with_lamp = self.with_lamp(&test, |pipeline| pipeline.fit(explored))?;
-            let residuals = residuals(explored, &with_lamp.unknowns);
-            fitted.push((residuals.iter().sum::<f64>(), test));
+            let rough = self.with_lamp(&test, |this| this.hypothesis(paths / ROUGH_DIVISOR))?;
+            fitted.push((rough.residuals.iter().sum::<f64>(), test));
         }
         fitted.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.index.cmp(&b.1.index)));
-        fitted.truncate(traced);
+        fitted.truncate(trials);
         Ok(fitted.into_iter().map(|(_, test)| test).collect())
     }
 
