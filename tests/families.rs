@@ -393,6 +393,33 @@ fn plan(seeds: &[u64], preset: Preset) -> Plan {
     }
 }
 
+/// The light field takes other surfaces for the lamp: none of it is found, and albedos are off by 0.066.
+#[test]
+fn preview_finds_a_lamp_that_no_photograph_sees() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plan = Plan {
+        families: vec![Family::Unseen],
+        size: [96, 72],
+        ..plan(&[5], Preset::Preview)
+    };
+    let mut solved = Vec::new();
+    let heard = &mut |event: RoomEvent| {
+        if let RoomEvent::Solved(row) = event {
+            solved.push(row.clone());
+        }
+    };
+    run(folder.path(), &plan, &|| false, heard).expect("solved");
+    let [row] = solved.as_slice() else {
+        panic!("{} rooms", solved.len());
+    };
+    assert_eq!(
+        (row.lamps_true, row.lamps_found, row.lamps_false),
+        (1, 1, 0)
+    );
+    let error = row.albedo_mae.expect("albedos that the solve identifies");
+    assert!(error < 0.03, "{error}");
+}
+
 #[test]
 fn rooms_that_are_in_the_table_are_not_solved_again() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -138,7 +138,7 @@ macro_rules! choice {
 choice! {
     /// Which solver runs, and how far.
     Preset {
-        /// A usable answer within about a second.
+        /// A usable answer within seconds.
         Preview = "preview",
         /// The default: a good answer in seconds.
         Balanced = "balanced",

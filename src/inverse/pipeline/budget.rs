@@ -20,9 +20,9 @@ pub struct Budget {
     /// Greatest number of paths of a trial of outside light: `preview`'s number in all presets, which the benchmarks of scanned rooms
     /// measure.
     pub trial_paths: u64,
-    /// Full paths of each round; zero ends the solve after the first stage.
+    /// Full paths of each round.
     pub round_paths: u64,
-    /// Greatest number of rounds.
+    /// Greatest number of rounds. Zero ends the solve after the first stage, or after the second one where lamps are out of sight.
     pub rounds: u32,
     /// Greatest number of rounds before textures are fitted.
     pub texture_rounds: u32,
@@ -51,7 +51,7 @@ impl Budget {
             budget.gbuffer_pixels = (budget.gbuffer_pixels as f64 * fraction).ceil() as usize;
         }
         if settings.paths > 0 {
-            let round = match budget.round_paths {
+            let round = match budget.rounds {
                 0 => &mut budget.light_field_paths,
                 _ => {
                     let fraction = settings.paths as f64 / budget.round_paths as f64;
@@ -74,7 +74,7 @@ impl Budget {
                 pixels: 60_000,
                 light_field_paths: PREVIEW_PATHS,
                 trial_paths: PREVIEW_PATHS,
-                round_paths: 0,
+                round_paths: 1_000_000,
                 rounds: 0,
                 texture_rounds: 0,
                 aim: Aim {
@@ -140,6 +140,6 @@ mod tests {
         assert_eq!(more.light_field_paths, plain.light_field_paths * 3);
         // A preset without rounds gets none.
         let preview = of(Preset::Preview, 0, 5_000);
-        assert_eq!((preview.light_field_paths, preview.round_paths), (5_000, 0));
+        assert_eq!((preview.light_field_paths, preview.rounds), (5_000, 0));
     }
 }

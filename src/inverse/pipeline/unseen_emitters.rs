@@ -29,10 +29,16 @@ const MAX_TRIALS: [usize; 2] = [4, 2];
 const PROMISING: f64 = 0.2;
 /// Least decrease of the mean residual over clusters, in standard errors.
 const MIN_DECREASE: f64 = 5.0;
+/// Limit of a cluster's residual: twenty times that of noise alone, which is 2.4 over three channels. One path that meets a lamp by
+/// chance would outweigh all other clusters.
+const MAX_RESIDUAL: f64 = 50.0;
 /// Paths of a round over the paths of the search, and of each trial.
 const PATHS_DIVISOR: u64 = 4;
 /// Paths of a trial over those of a rough one.
 const ROUGH_DIVISOR: u64 = 4;
+
+/// Fraction of the light from unseen lamps below which it does not matter which surfaces give it.
+const MIN_SHARE: f64 = 0.01;
 
 /// A set of lamps with everything fitted to it.
 struct Hypothesis {
@@ -52,6 +58,17 @@ impl Hypothesis {
 }
 
 impl Pipeline<'_, '_> {
+    /// Whether unseen lamps give more than [`MIN_SHARE`] of the light.
+    pub(super) fn is_lit_out_of_sight(&self) -> bool {
+        let weights = self.light_weights();
+        let all: f64 = weights.iter().sum();
+        let unseen = weights
+            .iter()
+            .zip(&self.roles)
+            .filter(|(_, role)| **role == Role::Unseen);
+        unseen.map(|(weight, _)| weight).sum::<f64>() > MIN_SHARE * all
+    }
+
     /// Searches for unseen lamps anew. Those of the light field are kept unless the new ones are significantly better.
     pub(super) fn search_anew(&mut self) -> Result {
         let by_light_field: Vec<usize> = (0..self.problem.scene.objects.len())
@@ -201,11 +218,12 @@ impl Pipeline<'_, '_> {
     }
 }
 
-/// Absolute residual of each cluster, relative to its level.
+/// Absolute residual of each cluster, relative to its level, up to [`MAX_RESIDUAL`].
 fn residuals(cache: &PathCache, unknowns: &Unknowns) -> Vec<f64> {
     let size = |cluster: Linearised| {
         let weight = cluster.weight_now();
-        (weight.powf(0.5) * cluster.residual().abs()).element_sum()
+        let sum = (weight.powf(0.5) * cluster.residual().abs()).element_sum();
+        sum.min(MAX_RESIDUAL)
     };
     cache.residuals(unknowns).into_iter().map(size).collect()
 }
