@@ -138,7 +138,7 @@ macro_rules! choice {
 choice! {
     /// Which solver runs, and how far.
     Preset {
-        /// A usable answer within seconds.
+        /// A usable answer within seconds; within a minute where lamps are out of sight.
         Preview = "preview",
         /// The default: a good answer in seconds.
         Balanced = "balanced",

@@ -7,6 +7,9 @@ pub const ACCURATE: f64 = 1.0 / 3.0;
 
 /// Paths of `preview`'s light field.
 const PREVIEW_PATHS: u64 = 400_000;
+/// Full paths of `preview`, which it traces where lamps are out of sight. With 400,000 the median error in `relit trade --rooms 6
+/// --family unseen --preset preview` is 0.078, with this number 0.060.
+const PREVIEW_SEARCH: u64 = 1_000_000;
 
 /// Work and targets of a solve.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,16 +54,13 @@ impl Budget {
             budget.gbuffer_pixels = (budget.gbuffer_pixels as f64 * fraction).ceil() as usize;
         }
         if settings.paths > 0 {
-            let round = match budget.rounds {
-                0 => &mut budget.light_field_paths,
-                _ => {
-                    let fraction = settings.paths as f64 / budget.round_paths as f64;
-                    budget.light_field_paths =
-                        (budget.light_field_paths as f64 * fraction).ceil() as u64;
-                    &mut budget.round_paths
-                }
+            let [first, second] = [&mut budget.light_field_paths, &mut budget.round_paths];
+            let (given, other) = match budget.rounds {
+                0 => (first, second),
+                _ => (second, first),
             };
-            *round = settings.paths;
+            *other = (*other as f64 * settings.paths as f64 / *given as f64).ceil() as u64;
+            *given = settings.paths;
         }
         budget.trial_paths = budget.trial_paths.min(budget.light_field_paths);
         budget
@@ -74,7 +74,7 @@ impl Budget {
                 pixels: 60_000,
                 light_field_paths: PREVIEW_PATHS,
                 trial_paths: PREVIEW_PATHS,
-                round_paths: 1_000_000,
+                round_paths: PREVIEW_SEARCH,
                 rounds: 0,
                 texture_rounds: 0,
                 aim: Aim {
@@ -138,8 +138,12 @@ mod tests {
         assert_eq!(more.gbuffer_pixels, plain.gbuffer_pixels * 2);
         assert_eq!(more.round_paths, plain.round_paths * 3);
         assert_eq!(more.light_field_paths, plain.light_field_paths * 3);
-        // A preset without rounds gets none.
-        let preview = of(Preset::Preview, 0, 5_000);
-        assert_eq!((preview.light_field_paths, preview.rounds), (5_000, 0));
+        // Without rounds the number is that of the light field.
+        let preview = of(Preset::Preview, 0, 4_000);
+        assert_eq!(
+            (preview.light_field_paths, preview.round_paths),
+            (4_000, 10_000)
+        );
+        assert_eq!(preview.rounds, 0);
     }
 }

@@ -53,8 +53,7 @@ impl Pipeline<'_, '_> {
     /// Removes insignificant emission of unseen objects, the least significant half at a time, with a refit after each.
     fn prune_unseen(&mut self, cache: &PathCache) -> Result {
         loop {
-            let mut doubtful: Vec<(f64, usize)> = (0..self.problem.scene.objects.len())
-                .filter(|&k| self.roles[k] == Role::Unseen && !self.emission_is_known(k))
+            let mut doubtful: Vec<(f64, usize)> = (self.unseen_lamps().into_iter())
                 .map(|k| (self.significance(k), k))
                 .filter(|(significance, _)| *significance < SIGNIFICANT)
                 .collect();

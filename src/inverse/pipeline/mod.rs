@@ -203,14 +203,14 @@ impl Pipeline<'_, '_> {
             self.light_field()?;
             self.end_stage(1)?;
         }
-        let rounds = self.budget.rounds > 0;
+        let has_rounds = self.budget.rounds > 0;
         // The light field cannot tell whether an unseen surface emits its light or reflects it.
-        if self.stages < 2 && (rounds || self.is_lit_out_of_sight()) {
+        if self.stages < 2 && (has_rounds || self.is_lit_out_of_sight()) {
             self.full_paths()?;
             self.tell_depth();
             self.end_stage(2)?;
         }
-        if !rounds {
+        if !has_rounds {
             return Ok(Termination::Converged);
         }
         if self.stages < 3 {
