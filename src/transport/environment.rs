@@ -17,6 +17,10 @@ pub struct Environment {
     pixels: Vec<Vec3>,
     /// Cumulative luminance × solid angle over the pixels.
     cumulative: Cumulative,
+    /// Pdf per solid angle of the map's directions within each pixel.
+    pdfs: Vec<f32>,
+    /// cosθ at the edges of the rows, from the top.
+    cosines: Vec<f64>,
     /// The distance of the light.
     surroundings: Surroundings,
     /// Radiance from above the horizon, if it differs, and the up vector.
@@ -33,10 +37,13 @@ impl Environment {
         if width == 0 || height == 0 || pixels.len() != width * height {
             return None;
         }
+        let cumulative = cumulative(width, height, pixels.iter().copied());
         Some(Self {
             width,
             height,
-            cumulative: cumulative(width, height, pixels.iter().copied()),
+            pdfs: pdfs(width, height, &cumulative),
+            cosines: (0..=height).map(|row| row_cosine(row, height)).collect(),
+            cumulative,
             pixels,
             surroundings: Surroundings::Far,
             above: None,
@@ -61,8 +68,10 @@ impl Environment {
             return None;
         }
         let mean = (self.pixels.iter().zip(&above)).map(|(below, above)| (*below + *above) * 0.5);
+        let cumulative = cumulative(self.width, self.height, mean);
         Some(Self {
-            cumulative: cumulative(self.width, self.height, mean),
+            pdfs: pdfs(self.width, self.height, &cumulative),
+            cumulative,
             above: Some((above, up)),
             ..self
         })
@@ -111,7 +120,7 @@ impl Environment {
         let index = self.cumulative.index_at(target)?;
         let (row, column) = (index / self.width, index % self.width);
         // Sample uniformly by solid angle within the pixel: uniformly in cosθ and φ.
-        let (top, bottom) = row_cosines(row, self.height);
+        let (top, bottom) = (self.cosines[row], self.cosines[row + 1]);
         let y = (top + (bottom - top) * f64::from(u[0])) as f32;
         let phi = 2.0 * PI * (column as f32 + u[1]) / self.width as f32;
         let r = (1.0 - y * y).max(0.0).sqrt();
@@ -191,13 +200,7 @@ impl Environment {
 
     /// Pdf per solid angle of the map's directions within a pixel.
     pub fn pixel_pdf(&self, index: usize) -> f32 {
-        let total = self.cumulative.total();
-        if total <= 0.0 {
-            return 0.0;
-        }
-        let weight = self.cumulative.sums()[index] - self.cumulative.before(index);
-        let solid_angle = row_solid_angle(index / self.width, self.width, self.height);
-        (weight / total / solid_angle) as f32
+        self.pdfs[index]
     }
 }
 
@@ -213,11 +216,25 @@ fn cumulative(width: usize, height: usize, pixels: impl Iterator<Item = Vec3>) -
     }))
 }
 
+/// Pdf per solid angle within each pixel, of choices in proportion to luminance × solid angle; zero for a black map.
+fn pdfs(width: usize, height: usize, cumulative: &Cumulative) -> Vec<f32> {
+    let total = cumulative.total();
+    let pdf = |index: usize| {
+        let weight = cumulative.sums()[index] - cumulative.before(index);
+        (weight / total / row_solid_angle(index / width, width, height)) as f32
+    };
+    let pixels = 0..width * height;
+    pixels
+        .map(|index| if total > 0.0 { pdf(index) } else { 0.0 })
+        .collect()
+}
+
 /// The pixel index of a unit direction in a `width` × `height` map, row by row.
 pub fn pixel_of(width: usize, height: usize, direction: Vec3) -> usize {
     let theta = direction.y.clamp(-1.0, 1.0).acos();
     let row = ((theta / PI * height as f32) as usize).min(height - 1);
-    let phi = direction.z.atan2(direction.x).rem_euclid(2.0 * PI);
+    let angle = direction.z.atan2(direction.x);
+    let phi = if angle < 0.0 { angle + 2.0 * PI } else { angle };
     let column = ((phi / (2.0 * PI) * width as f32) as usize).min(width - 1);
     row * width + column
 }
@@ -235,8 +252,12 @@ pub fn direction_of(width: usize, height: usize, pixel: usize) -> Vec3 {
 
 /// cosθ at the upper and lower edge of a row.
 pub fn row_cosines(row: usize, height: usize) -> (f64, f64) {
-    let angle = |r: usize| (std::f64::consts::PI * r as f64 / height as f64).cos();
-    (angle(row), angle(row + 1))
+    (row_cosine(row, height), row_cosine(row + 1, height))
+}
+
+/// cosθ at the upper edge of a row.
+fn row_cosine(row: usize, height: usize) -> f64 {
+    (std::f64::consts::PI * row as f64 / height as f64).cos()
 }
 
 /// Solid angle of one pixel of a row.

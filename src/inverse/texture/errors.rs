@@ -30,7 +30,7 @@ pub fn standard_errors(
     let unit = measurements.unit();
     let strength = texture.strength.unwrap_or(0.0);
     let colors: Vec<Vec3> = texture.colors.iter().map(|c| *c / unit).collect();
-    let matrix = NormalMatrix::new(measurements.observations, &measurements.weights);
+    let matrix = NormalMatrix::new(measurements.observations, &measurements.weights, links);
     let system = System {
         matrix: &matrix,
         links,

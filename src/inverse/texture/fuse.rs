@@ -60,7 +60,7 @@ fn fuse_here(problem: &Problem, strength: f32, start: &[Vec3]) -> Vec<Vec3> {
         prior,
         prior_weight,
     } = *problem;
-    let matrix = NormalMatrix::new(observations, row_weights);
+    let matrix = NormalMatrix::new(observations, row_weights, links);
     let mut right = observations.transpose_times(row_weights, values);
     for (r, mean) in right.iter_mut().zip(prior) {
         *r += *mean * prior_weight;
@@ -117,17 +117,22 @@ pub struct System<'a> {
 impl System<'_> {
     /// Solves for the right-hand side by conjugate gradients, starting at `colors`.
     pub fn solve(&self, right: &[Vec3], colors: &mut [Vec3]) {
-        let scale: Vec<Vec3A> = (0..colors.len())
+        let diagonal: Vec<Vec3A> = (0..colors.len())
             .into_par_iter()
             .with_min_len(TASK)
             .map(|cell| {
                 let penalty: f32 = self.penalties[self.links.row(cell)].iter().sum();
-                Vec3A::from(self.matrix.diagonal[cell] + penalty + self.prior_weight).recip()
+                Vec3A::from(self.matrix.diagonal[cell] + penalty + self.prior_weight)
             })
             .collect();
+        let scale: Vec<Vec3A> = diagonal.iter().map(|d| d.recip()).collect();
+        // Colours are padded so that each is read at once.
+        let apply = |x: &[Vec3A], product: &mut Vec<Vec3A>| {
+            (self.matrix).product(x, self.links, &self.penalties, &diagonal, product);
+        };
         let mut found: Vec<Vec3A> = colors.iter().map(|&c| c.into()).collect();
         let mut product = Vec::new();
-        self.apply(&found, &mut product);
+        apply(&found, &mut product);
         let mut residual: Vec<Vec3A> = (product.iter().zip(right))
             .map(|(p, b)| Vec3A::from(*b) - *p)
             .collect();
@@ -140,7 +145,7 @@ impl System<'_> {
             if !(rz > goal && rz > 0.0) {
                 break;
             }
-            self.apply(&direction, &mut product);
+            apply(&direction, &mut product);
             let alpha = (rz / dot(&direction, &product)) as f32;
             if !alpha.is_finite() {
                 break;
@@ -166,18 +171,6 @@ impl System<'_> {
         for (color, found) in colors.iter_mut().zip(found) {
             *color = found.into();
         }
-    }
-
-    /// The product of the matrix and a vector, whose colours are padded so that each is read at once.
-    fn apply(&self, x: &[Vec3A], product: &mut Vec<Vec3A>) {
-        let smooth = |cell: usize| {
-            let links = self.links.neighbours(cell);
-            let differences: Vec3A = links
-                .map(|(at, other)| (x[cell] - x[other]) * self.penalties[at])
-                .sum();
-            differences + x[cell] * self.prior_weight
-        };
-        self.matrix.product(x, smooth, product);
     }
 }
 
