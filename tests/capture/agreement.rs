@@ -1,7 +1,6 @@
 //! Photographs that do not show what the others show.
 
-mod scenes;
-
+use crate::scenes;
 use glam::DVec3;
 use relit::calibrate::problem::Problem;
 use relit::capture::photograph::Photograph;

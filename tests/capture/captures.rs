@@ -1,9 +1,6 @@
 //! Reads the captures beside the repository, where they are present.
 
-#[path = "common/beside.rs"]
-mod beside;
-
-use beside::beside;
+use crate::beside::beside;
 use relit::capture::photograph::Encoding;
 use relit::capture::read::{ReadOptions, read};
 use relit::capture::working::load_working;

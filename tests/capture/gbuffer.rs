@@ -1,7 +1,6 @@
 //! What of the photographs enters a fit, and what is kept to test it.
 
-mod scenes;
-
+use crate::scenes;
 use glam::{DVec3, Vec2, Vec3};
 use relit::calibrate::gbuffer::{GBuffer, SurfacePoint};
 use relit::calibrate::held_out::HoldOut;

@@ -1,7 +1,6 @@
 //! Photographs in one go: relit by the ratio of two renders, with objects in them, ended midway.
 
-mod common;
-
+use crate::common;
 use glam::{DVec3, Vec3};
 use relit::math::picture::Picture;
 use relit::render::{Device, Renderer};

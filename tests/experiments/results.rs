@@ -5,10 +5,7 @@
 //! 0.00067, 0.00088 and 0.00091, and at 43.95, 43.88 and 43.93 dB. Where another course of random numbers takes seed 1 beyond its
 //! bound, README's figure has to be measured again.
 
-#[path = "common/beside.rs"]
-mod beside;
-
-use beside::beside;
+use crate::beside::beside;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -1,7 +1,6 @@
 //! The gradient of the paper's squared loss against finite differences of an independent renderer.
 
-mod scenes;
-
+use crate::scenes;
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 use relit::inverse::paths::derivative::{Gradient, differentiate};

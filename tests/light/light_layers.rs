@@ -1,7 +1,6 @@
 //! Layers of light by lamp: they add up to the full render, and each is what its lamp alone would light.
 
-mod scenes;
-
+use crate::scenes;
 use glam::{DVec3, Vec3};
 use relit::export::light_layers;
 use relit::math::picture::Picture;

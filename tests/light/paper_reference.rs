@@ -1,9 +1,6 @@
 //! The Cornell box, photographed by another renderer, against our own rendering of its truth.
 
-#[path = "common/beside.rs"]
-mod beside;
-
-use beside::beside;
+use crate::beside::beside;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use relit::capture::read::{ReadOptions, read};

@@ -1,7 +1,6 @@
 //! Cached paths, evaluated for given unknowns, against the path tracer with those materials.
 
-mod scenes;
-
+use crate::scenes;
 use glam::{BVec3, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 use relit::calibrate::gbuffer::GBuffer;

@@ -1,7 +1,6 @@
 //! The path tracer against closed forms and against itself.
 
-mod scenes;
-
+use crate::scenes::{closed_box, lamp, scene_of};
 use glam::{DVec3, Vec3};
 use relit::math::rng::Stream;
 use relit::math::stats::Moments;
@@ -9,7 +8,6 @@ use relit::scene::geometry::Ray;
 use relit::transport::lit::LitScene;
 use relit::transport::material::Material;
 use relit::transport::path::{PathOptions, radiance};
-use scenes::{closed_box, lamp, scene_of};
 
 fn mean_radiance(lit: &LitScene, options: &PathOptions, seed: u64, paths: u64) -> [Moments; 3] {
     let mut moments = [Moments::default(); 3];

@@ -1,7 +1,6 @@
 //! Scenes written for other programs, read back by readers that are not ours where there are any.
 
-mod common;
-
+use crate::common;
 use glam::{DVec3, Mat4, Vec2, Vec3};
 use relit::export::scene::{Format, write};
 use relit::inverse::estimate::{Estimate, TexelEstimate};

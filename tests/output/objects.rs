@@ -1,9 +1,6 @@
 //! Objects to insert: what their files mean, where they come to stand, and what hostile files are told.
 
-#[path = "common/beside.rs"]
-mod beside;
-
-use beside::beside;
+use crate::beside::beside;
 use glam::{DQuat, DVec2, DVec3, Vec3};
 use relit::compose::object::ObjectModel;
 use relit::compose::placement::Placement;

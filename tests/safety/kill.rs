@@ -1,14 +1,7 @@
 //! Work that is never lost: a program that is killed at any moment leaves only files that can be read, and what it had
 //! done is taken up again.
-#![cfg(unix)]
 
-mod common;
-#[path = "common/files.rs"]
-mod files;
-#[path = "common/place.rs"]
-mod place;
-
-use place::Place;
+use crate::place::Place;
 use relit::math::rng::Stream;
 use relit::session::save;
 use std::fs;
@@ -142,7 +135,7 @@ fn iterations(folder: &Path) -> Option<u64> {
 }
 
 /// Kills saves, exports and edits at random moments, and an endless solve that is resumed each time. 24 moments;
-/// `RELIT_KILLS=100 cargo test --release --test kill` takes a hundred.
+/// `RELIT_KILLS=100 cargo test --release --test safety kill::` takes a hundred.
 #[test]
 fn a_kill_at_any_moment_leaves_only_whole_files_and_work_goes_on() {
     let moments = std::env::var("RELIT_KILLS")

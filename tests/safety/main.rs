@@ -12,6 +12,8 @@ mod said;
 mod accepted;
 #[cfg(unix)]
 mod ends;
+#[cfg(unix)]
+mod kill;
 mod overwritten;
 #[cfg(unix)]
 mod unheard;

@@ -1,7 +1,6 @@
 //! What is written while a solve runs: nothing that results or a resume need is missing, nothing old stays.
 
-mod common;
-
+use crate::common;
 use glam::Vec3;
 use relit::inverse::estimate::{Estimate, ObjectEstimate, TexelEstimate};
 use relit::inverse::settings::Settings;

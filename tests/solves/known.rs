@@ -1,7 +1,6 @@
 //! What is known beforehand is held to the bit by every solver, and the rest is solved around it.
 
-mod common;
-
+use crate::common;
 use glam::Vec3;
 use relit::calibrate::problem::Problem;
 use relit::inverse::estimate::Estimate;

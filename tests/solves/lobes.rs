@@ -1,7 +1,6 @@
 //! Rough specular lobes, found from photographs rendered in memory: on what has one, and on nothing else.
 
-mod scenes;
-
+use crate::scenes;
 use glam::{DVec3, Vec3};
 use relit::calibrate::problem::Problem;
 use relit::capture::mesh::Mesh;

@@ -1,7 +1,7 @@
 //! Light from outside: found in a room that a sky lights through a window, not looked for in a room with lamps.
 
-mod scenes;
-
+use crate::scenes;
+use crate::scenes::View;
 use glam::{DVec3, Vec3};
 use relit::calibrate::gbuffer::GBuffer;
 use relit::calibrate::held_out::HoldOut;
@@ -18,7 +18,6 @@ use relit::scene::Scene;
 use relit::transport::environment::{Environment, direction_of, pixel_of, row_solid_angle};
 use relit::transport::material::Material;
 use relit::transport::surroundings::Surroundings;
-use scenes::View;
 use std::f32::consts::PI;
 use std::sync::{Arc, LazyLock};
 

@@ -1,7 +1,6 @@
 //! The paper's descent from one albedo an object to the parts of triangles that a texture asks for.
 
-mod scenes;
-
+use crate::scenes;
 use glam::{DVec3, Vec3};
 use relit::calibrate::problem::Problem;
 use relit::inverse::estimate::Estimate;

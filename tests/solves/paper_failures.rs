@@ -1,8 +1,7 @@
 //! The failures that the paper shows of itself (its Fig. 6), each on a small scene, and what is done about it. Highlights that go
 //! into albedos are in `lobes.rs`.
 
-mod scenes;
-
+use crate::scenes;
 use glam::{DVec3, Vec3};
 use relit::calibrate::problem::Problem;
 use relit::inverse::estimate::Estimate;

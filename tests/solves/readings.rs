@@ -1,9 +1,7 @@
 //! Mistakes that all photographs of a capture share are found before anything is solved, and sound captures are not refused.
 //! `relit study readings` measures the same over many rooms.
 
-#[path = "common/beside.rs"]
-mod beside;
-
+use crate::beside;
 use relit::calibrate::alignment::{Decision, Evidence, MispairedPhotograph};
 use relit::capture::Capture;
 use relit::capture::read::{ReadOptions, read};

@@ -1,7 +1,6 @@
 //! A solve that is taken up again ends where it would have ended anyway, to the bit.
 
-mod common;
-
+use crate::common;
 use relit::calibrate::problem::Problem;
 use relit::inverse::estimate::Estimate;
 use relit::inverse::settings::{Preset, Settings};

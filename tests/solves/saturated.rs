@@ -1,7 +1,7 @@
 //! Photographs that saturate: what they show of a lamp is a lower bound, and the lamp is found by the light that it sends.
 
-mod scenes;
-
+use crate::scenes;
+use crate::scenes::albedo;
 use glam::Vec3;
 use relit::calibrate::problem::Problem;
 use relit::capture::photograph::{Photograph, PhotographSource};
@@ -11,7 +11,6 @@ use relit::inverse::loss::LossProbe;
 use relit::inverse::paper::descent::Descent;
 use relit::inverse::settings::{Preset, Settings};
 use relit::transport::material::Material;
-use scenes::albedo;
 use std::sync::Arc;
 
 const LAMP: usize = 6;

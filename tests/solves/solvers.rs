@@ -1,7 +1,7 @@
 //! The solvers on a room whose photographs are rendered in memory.
 
-mod scenes;
-
+use crate::scenes;
+use crate::scenes::albedo;
 use glam::{DVec3, Vec3};
 use relit::calibrate::problem::Problem;
 use relit::capture::exposure::{Exposure, Vignetting};
@@ -13,7 +13,6 @@ use relit::inverse::solver::{Control, Observer, Progress, Solution, Termination}
 use relit::math::color::{linear_to_srgb, srgb_to_linear};
 use relit::math::stats::quantile;
 use relit::transport::material::Material;
-use scenes::albedo;
 use std::sync::{Arc, LazyLock};
 
 const SIZE: [u32; 2] = [48, 36];

@@ -1,7 +1,6 @@
 //! Albedo that varies over an object, found from photographs rendered in memory.
 
-mod scenes;
-
+use crate::scenes;
 use glam::{DVec3, Vec3};
 use relit::calibrate::gbuffer::GBuffer;
 use relit::calibrate::held_out::HoldOut;

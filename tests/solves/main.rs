@@ -1,0 +1,21 @@
+//! Whole solves of small rooms whose truth is known.
+
+#[path = "../common/beside.rs"]
+mod beside;
+#[path = "../common/mod.rs"]
+mod common;
+#[path = "../scenes/mod.rs"]
+mod scenes;
+
+mod checkpoints;
+mod families;
+mod known;
+mod lobes;
+mod outside;
+mod paper;
+mod paper_failures;
+mod readings;
+mod resume;
+mod saturated;
+mod solvers;
+mod textures;
