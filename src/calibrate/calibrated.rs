@@ -20,17 +20,31 @@ pub struct Calibrated {
     pub rays: u64,
 }
 
+/// How photographs are prepared.
+#[derive(Debug, Clone, Copy)]
+pub struct CalibrationOptions {
+    /// The pixels that are kept from fits.
+    pub hold_out: HoldOut,
+    /// Seed of the g-buffer's rays.
+    pub seed: u64,
+    /// Number of pixels of the g-buffer, about.
+    pub pixels: usize,
+    /// Whether frames that contradict the others are left out.
+    pub leave_out: bool,
+    /// Whether exposures, vignetting and response are estimated.
+    pub exposures: bool,
+}
+
 impl Calibrated {
-    /// Prepares the photographs of a problem with a g-buffer of about `pixels` pixels, whose rays have the seed `seed`. Frames that
-    /// contradict the others are left out if `leave_out`; exposures, vignetting and response are estimated if `expose`.
-    pub fn new(
-        problem: &Problem,
-        hold_out: HoldOut,
-        seed: u64,
-        pixels: usize,
-        leave_out: bool,
-        expose: bool,
-    ) -> Self {
+    /// Prepares the photographs of a problem.
+    pub fn new(problem: &Problem, options: CalibrationOptions) -> Self {
+        let CalibrationOptions {
+            hold_out,
+            seed,
+            pixels,
+            leave_out,
+            exposures: expose,
+        } = options;
         let gbuffer_of = |problem: &Problem| GBuffer::new(problem, hold_out, seed, pixels);
         let mut problem = problem.clone();
         let mut gbuffer = gbuffer_of(&problem);

@@ -1,8 +1,12 @@
 //! Families of generated rooms: each holds what it promises.
 
 use glam::{DQuat, Vec2, Vec3};
+use relit::calibrate::calibrated::{Calibrated, CalibrationOptions};
+use relit::calibrate::held_out::HoldOut;
+use relit::calibrate::problem::Problem;
+use relit::capture::Frame;
 use relit::capture::photograph::Encoding;
-use relit::inverse::settings::Preset;
+use relit::inverse::settings::{Preset, Settings};
 use relit::math::color::linear_to_srgb;
 use relit::math::rng::splitmix64;
 use relit::math::stats::quantile;
@@ -11,6 +15,7 @@ use relit::room::photographs::{self, Rendering};
 use relit::scene::Scene;
 use relit::study::families::{Plan, Quantiles, RoomEvent, Row, run, summarize};
 use relit::transport::material::{Albedo, Material};
+use std::sync::Arc;
 
 /// Size of photographs that are rendered in a moment.
 const TINY: [u32; 2] = [24, 18];
@@ -312,6 +317,32 @@ fn telephones_write_eight_bits_at_exposures_that_differ_and_dim_the_corners() {
         let dimmed = corners.iter().sum::<f64>() / corners.len() as f64;
         assert!(dimmed < 0.95, "{corners:?}");
     }
+}
+
+/// The rounding of JPEG's dark values looks like a camera's response in this room; taken for one, it put a channel of the albedos
+/// off by their whole size.
+#[test]
+fn no_response_is_found_in_photographs_that_have_none() {
+    let room = Family::Phone.generate(2, [96, 72]).expect("a room");
+    let photographs = room.capture.frames.iter().map(Frame::load);
+    let photographs = photographs.map(|photograph| photograph.expect("in memory"));
+    let problem = Problem {
+        scene: Arc::new(Scene::new(&room.capture).expect("triangles")),
+        photographs: photographs.collect(),
+    };
+    let settings = Settings::default();
+    let options = CalibrationOptions {
+        hold_out: HoldOut::from(&settings),
+        seed: 2,
+        pixels: problem.pixels(),
+        leave_out: true,
+        exposures: true,
+    };
+    let found = Calibrated::new(&problem, options).exposures;
+    let found = found.expect("photographs that share surfaces");
+    println!("{found:?}");
+    assert!(found.differ && found.vignetting.is_some());
+    assert_eq!(found.response, None);
 }
 
 #[test]

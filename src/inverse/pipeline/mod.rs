@@ -17,7 +17,7 @@ mod textures;
 mod trace;
 mod unseen_emitters;
 
-use crate::calibrate::calibrated::Calibrated;
+use crate::calibrate::calibrated::{Calibrated, CalibrationOptions};
 use crate::calibrate::exposure::Exposures;
 use crate::calibrate::gbuffer::GBuffer;
 use crate::calibrate::held_out::HoldOut;
@@ -129,11 +129,13 @@ pub fn solve(
         rays,
     } = Calibrated::new(
         problem,
-        HoldOut::from(settings),
-        settings.seed,
-        budget.gbuffer_pixels,
-        settings.leave_out,
-        settings.exposures,
+        CalibrationOptions {
+            hold_out: HoldOut::from(settings),
+            seed: settings.seed,
+            pixels: budget.gbuffer_pixels,
+            leave_out: settings.leave_out,
+            exposures: settings.exposures,
+        },
     );
     let problem = &problem;
     monitor.progress.rays += rays;

@@ -219,9 +219,7 @@ impl Pipeline<'_, '_> {
         self.roles[surface] = Role::Unseen;
         self.unknowns.emission[surface] = mean_radiance(&self.clusters);
         self.robust = RobustWeights::even(self.roles.len());
-        let paths = self.paths_of(field, self.budget.trial_paths)?;
-        let fitted = self.fit(&paths)?;
-        self.settle_roles(&paths, fitted)?;
+        let paths = self.settled(field)?;
         self.weigh(&paths)?;
         self.trial(Some(paths), field.cache)
     }
@@ -233,15 +231,21 @@ impl Pipeline<'_, '_> {
             return Ok(None);
         }
         self.outside.sun = sun;
-        let paths = self.paths_of(field, self.budget.trial_paths)?;
-        let fitted = self.fit(&paths)?;
-        self.settle_roles(&paths, fitted)?;
+        let paths = self.settled(field)?;
         let moved = self.trial(Some(paths), field.cache)?;
         if moved.misfit.mean() < sunny.misfit.mean() {
             return Ok(Some(moved));
         }
         self.go_back_to(sunny.found.clone());
         Ok(None)
+    }
+
+    /// Traces paths in the present light from outside, fits to them and settles the roles; returns the paths.
+    fn settled(&mut self, field: LightField) -> Result<PathCache> {
+        let paths = self.paths_of(field, self.budget.trial_paths)?;
+        let fitted = self.fit(&paths)?;
+        self.settle_roles(&paths, fitted)?;
+        Ok(paths)
     }
 
     /// Where the sun stands, for reports; empty without one.
