@@ -4,8 +4,8 @@ use glam::{DQuat, Vec2, Vec3};
 use relit::calibrate::calibrated::{Calibrated, CalibrationOptions};
 use relit::calibrate::held_out::HoldOut;
 use relit::calibrate::problem::Problem;
-use relit::capture::Frame;
 use relit::capture::photograph::Encoding;
+use relit::capture::working::load_working;
 use relit::inverse::settings::{Preset, Settings};
 use relit::math::color::linear_to_srgb;
 use relit::math::rng::splitmix64;
@@ -13,6 +13,7 @@ use relit::math::stats::quantile;
 use relit::room::generated::{Family, Generated, generate};
 use relit::room::photographs::{self, Rendering};
 use relit::scene::Scene;
+use relit::scene::prepare::prepare;
 use relit::study::families::{Plan, Quantiles, RoomEvent, Row, run, summarize};
 use relit::transport::material::{Albedo, Material};
 use std::sync::Arc;
@@ -324,17 +325,17 @@ fn telephones_write_eight_bits_at_exposures_that_differ_and_dim_the_corners() {
 #[test]
 fn no_response_is_found_in_photographs_that_have_none() {
     let room = Family::Phone.generate(2, [96, 72]).expect("a room");
-    let photographs = room.capture.frames.iter().map(Frame::load);
-    let photographs = photographs.map(|photograph| photograph.expect("in memory"));
+    let working = load_working(&room.capture, u64::MAX).expect("in memory");
+    let prepared = prepare(&room.capture, &working).expect("triangles");
     let problem = Problem {
-        scene: Arc::new(Scene::new(&room.capture).expect("triangles")),
-        photographs: photographs.collect(),
+        scene: Arc::new(prepared.scene),
+        photographs: prepared.photographs,
     };
     let settings = Settings::default();
     let options = CalibrationOptions {
         hold_out: HoldOut::from(&settings),
         seed: 2,
-        pixels: problem.pixels(),
+        pixels: 400_000,
         leave_out: true,
         exposures: true,
     };
