@@ -2,8 +2,6 @@
 
 #[path = "../common/beside.rs"]
 mod beside;
-#[path = "../common/mod.rs"]
-mod common;
 #[path = "../scenes/mod.rs"]
 mod scenes;
 
@@ -11,7 +9,6 @@ mod agreement;
 mod captures;
 mod gbuffer;
 mod overexposed;
-mod photographs;
 mod prepare;
 mod segments;
 mod sharpness;

@@ -1,4 +1,4 @@
-//! What goes out: insertions, the objects that are inserted, and exported files.
+//! What goes out: photographs with objects in them or in other light, and exported files.
 
 #[path = "../common/beside.rs"]
 mod beside;
@@ -8,3 +8,4 @@ mod common;
 mod export;
 mod insertion;
 mod objects;
+mod photographs;

@@ -1,4 +1,4 @@
-//! Whole solves of small rooms whose truth is known.
+//! Whole solves of small rooms whose truth is known, the families of generated rooms, and what a solve leaves to go on from.
 
 #[path = "../common/beside.rs"]
 mod beside;

@@ -31,12 +31,8 @@ pub fn standard_errors(
     let strength = texture.strength.unwrap_or(0.0);
     let colors: Vec<Vec3> = texture.colors.iter().map(|c| *c / unit).collect();
     let matrix = NormalMatrix::new(measurements.observations, &measurements.weights, links);
-    let system = System {
-        matrix: &matrix,
-        links,
-        penalties: penalties(links, &vec![1.0; count], strength, &colors),
-        prior_weight: texture.prior_weight,
-    };
+    let penalties = penalties(links, &vec![1.0; count], strength, &colors);
+    let system = System::new(&matrix, links, penalties, texture.prior_weight);
     let deviations = (0..DRAWS).into_par_iter().map(|draw| {
         let right = perturbation(&system, measurements, seed, object, draw);
         let mut deviation = vec![Vec3::ZERO; count];

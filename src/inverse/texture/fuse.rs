@@ -67,12 +67,8 @@ fn fuse_here(problem: &Problem, strength: f32, start: &[Vec3]) -> Vec<Vec3> {
     }
     let mut colors = start.to_vec();
     for _ in 0..MAX_REWEIGHTINGS {
-        let system = System {
-            matrix: &matrix,
-            links,
-            penalties: penalties(links, levels, strength, &colors),
-            prior_weight,
-        };
+        let penalties = penalties(links, levels, strength, &colors);
+        let system = System::new(&matrix, links, penalties, prior_weight);
         let before = colors.clone();
         system.solve(&right, &mut colors);
         let change: f64 = sum(&colors, &before, |a, b| f64::from((a - b).length_squared()));
@@ -112,27 +108,40 @@ pub struct System<'a> {
     pub penalties: Vec<f32>,
     /// The weight of the prior.
     pub prior_weight: f32,
+    /// The diagonal of the whole matrix.
+    diagonal: Vec<Vec3A>,
 }
 
-impl System<'_> {
-    /// Solves for the right-hand side by conjugate gradients, starting at `colors`.
-    pub fn solve(&self, right: &[Vec3], colors: &mut [Vec3]) {
-        let diagonal: Vec<Vec3A> = (0..colors.len())
-            .into_par_iter()
+impl<'a> System<'a> {
+    /// The measurements' part of the matrix, the graph that it was made with, and the weights of the other parts.
+    pub fn new(
+        matrix: &'a NormalMatrix,
+        links: &'a Links,
+        penalties: Vec<f32>,
+        prior_weight: f32,
+    ) -> Self {
+        let diagonal = (matrix.diagonal.par_iter().enumerate())
             .with_min_len(TASK)
-            .map(|cell| {
-                let penalty: f32 = self.penalties[self.links.row(cell)].iter().sum();
-                Vec3A::from(self.matrix.diagonal[cell] + penalty + self.prior_weight)
+            .map(|(cell, measured)| {
+                let penalty: f32 = penalties[links.row(cell)].iter().sum();
+                Vec3A::from(*measured + penalty + prior_weight)
             })
             .collect();
-        let scale: Vec<Vec3A> = diagonal.iter().map(|d| d.recip()).collect();
-        // Colours are padded so that each is read at once.
-        let apply = |x: &[Vec3A], product: &mut Vec<Vec3A>| {
-            (self.matrix).product(x, self.links, &self.penalties, &diagonal, product);
-        };
+        Self {
+            matrix,
+            links,
+            penalties,
+            prior_weight,
+            diagonal,
+        }
+    }
+
+    /// Solves for the right-hand side by conjugate gradients, starting at `colors`.
+    pub fn solve(&self, right: &[Vec3], colors: &mut [Vec3]) {
+        let scale: Vec<Vec3A> = self.diagonal.iter().map(|d| d.recip()).collect();
         let mut found: Vec<Vec3A> = colors.iter().map(|&c| c.into()).collect();
         let mut product = Vec::new();
-        apply(&found, &mut product);
+        self.apply(&found, &mut product);
         let mut residual: Vec<Vec3A> = (product.iter().zip(right))
             .map(|(p, b)| Vec3A::from(*b) - *p)
             .collect();
@@ -145,7 +154,7 @@ impl System<'_> {
             if !(rz > goal && rz > 0.0) {
                 break;
             }
-            apply(&direction, &mut product);
+            self.apply(&direction, &mut product);
             let alpha = (rz / dot(&direction, &product)) as f32;
             if !alpha.is_finite() {
                 break;
@@ -171,6 +180,17 @@ impl System<'_> {
         for (color, found) in colors.iter_mut().zip(found) {
             *color = found.into();
         }
+    }
+
+    /// The product of the matrix and a vector, whose colours are padded so that each is read at once.
+    fn apply(&self, x: &[Vec3A], product: &mut Vec<Vec3A>) {
+        let Self {
+            links,
+            penalties,
+            diagonal,
+            ..
+        } = self;
+        self.matrix.product(x, links, penalties, diagonal, product);
     }
 }
 
