@@ -161,7 +161,7 @@ pub struct Outside {
     pub above: Option<Vec<Vec3>>,
     /// Distance of the light: infinite, or a box.
     pub surroundings: Surroundings,
-    /// For a box, the sun beyond it. Far away, the sun is a pixel of the map.
+    /// The sun beside the map.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sun: Option<Sun>,
     /// The pixels of the box that the sun shines through: those that photographs show bright. `None` if all.

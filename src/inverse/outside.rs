@@ -15,6 +15,9 @@ use std::f64::consts::PI;
 const CELL_PIXELS: f64 = 2.0;
 /// Least and greatest number of columns of the map.
 const COLUMNS: [usize; 2] = [32, 512];
+/// Radiance over the room's mean above which a pixel shows the sun. Its disc is 46,000 times as bright as a white surface that it
+/// lights, so that even a pixel that it fills to a twentieth is brighter than this.
+const SUN_LIKE: f32 = 1e3;
 /// Unseen directions take the mean of a block of up to 2^(LEVELS − 1) cells a side.
 const LEVELS: usize = 3;
 
@@ -29,6 +32,8 @@ pub struct MeasuredOutside {
     up: Vec3,
     /// Mean luminance of the mesh in the photographs.
     room: f32,
+    /// The unit direction in which unsaturated photographs show the sun.
+    sun: Option<Vec3>,
 }
 
 /// Cells of light from one side of the horizon.
@@ -38,6 +43,8 @@ struct Half {
     known: Vec<bool>,
     /// Whether each cell has only saturated pixels, so that its radiance is a lower bound.
     censored: Vec<bool>,
+    /// Whether photographs look into each cell and show no sun there.
+    sunless: Vec<bool>,
 }
 
 /// Sum of radiance and number of pixels of a cell, unsaturated and saturated ones.
@@ -53,31 +60,32 @@ impl MeasuredOutside {
         let height = height.next_multiple_of(1 << (LEVELS - 1));
         let width = 2 * height;
 
-        // Sum radiance in the finest cells, separately for unsaturated and saturated pixels.
+        let room = mean_of_mesh(problem, gbuffer);
+        // Sum radiance in the finest cells, separately for unsaturated and saturated pixels, and apart from the sun.
         let mut sums: [Vec<Sums>; 2] = [(); 2].map(|()| vec![Sums::default(); width * height]);
         let past_the_mesh = (gbuffer.pixels.iter()).filter(|p| {
             !p.held_out && p.object == u32::MAX && p.points.iter().all(Option::is_none)
         });
+        let mut sun = Vec3::ZERO;
         for pixel in past_the_mesh {
             let photograph = &problem.photographs[pixel.frame as usize];
             let camera = &scene.cameras[pixel.frame as usize];
             let ray = camera.ray(camera.corner(pixel.pixel as usize) + 0.5);
             let direction = ray.direction.normalize_or_zero();
             let map_direction = surroundings.map_direction(ray.origin, direction);
-            let saturated = usize::from(photograph.is_saturated(pixel.pixel as usize));
+            let radiance = photograph.pixels[pixel.pixel as usize];
+            let saturated = photograph.is_saturated(pixel.pixel as usize);
+            if !saturated && luminance(radiance) > SUN_LIKE * room {
+                sun += direction * luminance(radiance);
+                continue;
+            }
             let half = &mut sums[usize::from(direction.dot(scene.up) > 0.0)];
-            let sum = &mut half[pixel_of(width, height, map_direction)][saturated];
-            sum.0 += photograph.pixels[pixel.pixel as usize].as_dvec3();
+            let sum = &mut half[pixel_of(width, height, map_direction)][usize::from(saturated)];
+            sum.0 += radiance.as_dvec3();
             sum.1 += 1;
         }
         if sums.iter().flatten().flatten().all(|s| s.1 == 0) {
             return None;
-        }
-        let (mut room, mut pixels) = (0.0, 0);
-        for p in gbuffer.fitted() {
-            let pixel = problem.photographs[p.frame as usize].pixels[p.pixel as usize];
-            room += f64::from(luminance(pixel));
-            pixels += 1;
         }
         let [(below, dark), (above, bright)] = sums.map(|sums| Half::new(width, height, &sums));
         let map = Environment::new(width, height, dark)?.around(surroundings);
@@ -85,7 +93,8 @@ impl MeasuredOutside {
             map: map.with_above(bright, scene.up)?,
             halves: [below, above],
             up: scene.up,
-            room: (room / f64::from(pixels.max(1))) as f32,
+            room,
+            sun: sun.try_normalize(),
         })
     }
 
@@ -101,6 +110,17 @@ impl MeasuredOutside {
     pub fn is_bound(&self, origin: Vec3, direction: Vec3) -> bool {
         let (half, cell) = self.cell(origin, direction);
         half.censored[cell]
+    }
+
+    /// The unit direction in which unsaturated photographs show the sun.
+    pub fn seen_sun(&self) -> Option<Vec3> {
+        self.sun
+    }
+
+    /// Whether a sun may stand far away in a direction: no photograph looks there, or it shows the sun or is saturated.
+    pub fn may_hold_sun(&self, direction: Vec3) -> bool {
+        let (half, cell) = self.cell(Vec3::ZERO, direction);
+        !half.sunless[cell]
     }
 
     /// Whether a sun may shine in along a ray. From far away it may. Through a box it may where photographs show light from above
@@ -203,6 +223,17 @@ impl MeasuredOutside {
     }
 }
 
+/// Mean luminance of the mesh in the photographs.
+fn mean_of_mesh(problem: &Problem, gbuffer: &GBuffer) -> f32 {
+    let (mut sum, mut pixels) = (0.0, 0);
+    for p in gbuffer.fitted() {
+        let pixel = problem.photographs[p.frame as usize].pixels[p.pixel as usize];
+        sum += f64::from(luminance(pixel));
+        pixels += 1;
+    }
+    (sum / f64::from(pixels.max(1))) as f32
+}
+
 impl Half {
     /// Whether a cell is measured and brighter than `least`, or saturated.
     fn is_brighter(&self, cell: usize, pixels: &[Vec3], least: f32) -> bool {
@@ -235,6 +266,9 @@ impl Half {
         let half = Self {
             known: means.iter().map(Option::is_some).collect(),
             censored: means.iter().map(|m| m.is_some_and(|m| m.0)).collect(),
+            sunless: (sums.iter())
+                .map(|[measured, saturated]| measured.1 > 0 && saturated.1 == 0)
+                .collect(),
         };
         let pixels = means.iter().map(|m| m.map_or(Vec3::ZERO, |m| m.1));
         (half, pixels.collect())
@@ -255,6 +289,7 @@ mod tests {
         let half = Half {
             known: (0..128).map(|c| c == above || c == below).collect(),
             censored: vec![false; 128],
+            sunless: vec![false; 128],
         };
         let none = Half {
             known: vec![false; 128],
@@ -265,6 +300,7 @@ mod tests {
             map: Environment::new(width, height, pixels).expect("sizes fit"),
             up: Vec3::Y,
             room: 1.0,
+            sun: None,
         };
         let at = |row: usize| {
             let direction = direction_of(width, height, row * 16 + 12);
@@ -288,6 +324,7 @@ mod tests {
         let half = |censored: bool| Half {
             known: vec![true, false],
             censored: vec![censored, false],
+            sunless: vec![!censored, false],
         };
         let pixels = |radiance: f32| vec![Vec3::splat(radiance), Vec3::ZERO];
         let map = Environment::new(2, 1, pixels(0.5)).expect("sizes fit");
@@ -296,6 +333,7 @@ mod tests {
             map: map.with_above(pixels(3.0), Vec3::Y).expect("sizes fit"),
             up: Vec3::Y,
             room: 1.0,
+            sun: None,
         };
         let seen = direction_of(2, 1, 0);
         let at = |rise: f32| (seen + Vec3::Y * rise).normalize();

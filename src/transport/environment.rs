@@ -2,7 +2,7 @@
 
 use crate::math::color::luminance;
 use crate::math::cumulative::Cumulative;
-use crate::transport::sun::Sun;
+use crate::transport::sun::{self, Sun};
 use crate::transport::surroundings::Surroundings;
 use glam::Vec3;
 use std::f32::consts::PI;
@@ -109,7 +109,7 @@ impl Environment {
     pub fn sample(&self, origin: Vec3, choice: f64, u: [f32; 2]) -> Option<(Vec3, f32)> {
         let share = self.sun_share();
         if let Some(sun) = self.sun.filter(|_| choice < share) {
-            let direction = sun.sample(u);
+            let direction = sun::sample(sun.direction, u);
             return Some((direction, self.pdf(origin, direction)));
         }
         let total = self.cumulative.total();

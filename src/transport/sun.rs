@@ -29,14 +29,7 @@ impl Sun {
         }
     }
 
-    /// A direction drawn evenly from the disc.
-    pub fn sample(&self, u: [f32; 2]) -> Vec3 {
-        let (radius, angle) = (RADIUS * u[0].sqrt(), 2.0 * PI * u[1]);
-        let beside = Vec3::new(radius * angle.cos(), radius * angle.sin(), 1.0);
-        Frame::around(self.direction).to_world(beside).normalize()
-    }
-
-    /// Pdf per solid angle of [`Sun::sample`].
+    /// Pdf per solid angle of [`sample`].
     pub fn pdf(&self, direction: Vec3) -> f32 {
         match self.covers(direction) {
             true => 1.0 / Self::SOLID_ANGLE,
@@ -48,4 +41,11 @@ impl Sun {
         // The chord of an angle, which keeps more digits than its cosine.
         direction.distance_squared(self.direction) <= RADIUS * RADIUS
     }
+}
+
+/// A unit direction drawn evenly from the disc of a sun that stands in the direction `towards`.
+pub fn sample(towards: Vec3, u: [f32; 2]) -> Vec3 {
+    let (radius, angle) = (RADIUS * u[0].sqrt(), 2.0 * PI * u[1]);
+    let beside = Vec3::new(radius * angle.cos(), radius * angle.sin(), 1.0);
+    Frame::around(towards).to_world(beside).normalize()
 }

@@ -15,8 +15,9 @@ use relit::inverse::settings::{Preset, Settings};
 use relit::inverse::solve;
 use relit::inverse::solver::{Checkpoint, Control, Observer, Progress, Solution};
 use relit::scene::Scene;
-use relit::transport::environment::{Environment, direction_of, pixel_of, row_solid_angle};
+use relit::transport::environment::Environment;
 use relit::transport::material::Material;
+use relit::transport::sun::Sun;
 use relit::transport::surroundings::Surroundings;
 use std::f32::consts::PI;
 use std::sync::{Arc, LazyLock};
@@ -122,34 +123,31 @@ struct Sunny {
     capture: Capture,
     photographs: Vec<Arc<Photograph>>,
     materials: Vec<Material>,
-    /// Direction towards the sun.
-    sun: Vec3,
-    /// The sun's irradiance, twice that of a uniform sky of radiance 4.
-    irradiance: Vec3,
+    /// Its irradiance is twice that of a uniform sky of radiance 4.
+    sun: Sun,
 }
 
-static SUNNY: LazyLock<Sunny> = LazyLock::new(|| {
-    let (width, height) = (256, 128);
-    let pixel = pixel_of(width, height, Vec3::new(0.2, 0.8, 0.6));
-    let mut pixels: Vec<Vec3> = (0..width * height)
-        .map(|pixel| sky().radiance(Vec3::ZERO, direction_of(width, height, pixel)))
-        .collect();
-    let irradiance = Vec3::new(1.0, 0.9, 0.7) * 8.0 * PI;
-    pixels[pixel] += irradiance / row_solid_angle(pixel / width, width, height) as f32;
-    let lit_by = Environment::new(width, height, pixels).map(Arc::new);
-    let (mesh, materials) = room_with_a_window();
-    let capture = scenes::capture(mesh, &views(), SIZE);
-    let problem = scenes::photographed_under(lit_by, &capture, &materials, 512, 75);
-    Sunny {
-        capture,
-        photographs: problem.photographs,
-        materials,
-        sun: direction_of(width, height, pixel),
-        irradiance,
-    }
-});
+static SUNNY: LazyLock<Sunny> = LazyLock::new(|| Sunny::new(Vec3::new(0.2, 0.8, 0.6), &views()));
 
 impl Sunny {
+    fn new(towards: Vec3, views: &[View]) -> Self {
+        let sun = Sun {
+            direction: towards.normalize(),
+            irradiance: Vec3::new(1.0, 0.9, 0.7) * 8.0 * PI,
+        };
+        let lit_by = Environment::clone(&sky()).with_sun(Some(sun), None);
+        let (mesh, materials) = room_with_a_window();
+        let capture = scenes::capture(mesh, views, SIZE);
+        let lit_by = lit_by.map(Arc::new);
+        let problem = scenes::photographed_under(lit_by, &capture, &materials, 512, 75);
+        Self {
+            capture,
+            photographs: problem.photographs,
+            materials,
+            sun,
+        }
+    }
+
     /// What a solve finds if the room is a scan, or is none.
     fn solved(&self, scanned: bool) -> Estimate {
         let mut scene = Scene::new(&self.capture).expect("the room is sound");
@@ -160,6 +158,15 @@ impl Sunny {
         };
         run(&problem).estimate
     }
+
+    /// Angle in degrees between the found sun and the true one, and the largest relative error of its irradiance.
+    fn errors(&self, found: Option<Sun>) -> [f32; 2] {
+        let found = found.expect("a sun");
+        let angle = found.direction.angle_between(self.sun.direction);
+        let ratio = found.irradiance / self.sun.irradiance;
+        println!("{}° off, {ratio} of its irradiance", angle.to_degrees());
+        [angle.to_degrees(), (ratio - 1.0).abs().max_element()]
+    }
 }
 
 /// It is found by the pool of light that it throws into the room.
@@ -168,18 +175,11 @@ fn a_sun_through_the_window_is_found_by_where_its_light_falls() {
     let sunny = &*SUNNY;
     let estimate = sunny.solved(false);
     let outside = estimate.outside.as_ref().expect("the sky is seen");
-    let [width, height] = [outside.width, outside.height].map(|side| side as usize);
-    let brightest = (0..outside.pixels.len())
-        .max_by(|&a, &b| outside.pixels[a].y.total_cmp(&outside.pixels[b].y))
-        .expect("a map has pixels");
-    let angle = direction_of(width, height, brightest).angle_between(sunny.sun);
-    let angle = angle.to_degrees();
-    let solid_angle = row_solid_angle(brightest / width, width, height) as f32;
-    let found = outside.pixels[brightest] * solid_angle / sunny.irradiance;
-    println!("{angle}° off, {found} of its irradiance");
-    assert!(angle < 3.0, "{angle}");
-    assert!((found - 1.0).abs().max_element() < 0.1, "{found}");
-    // 0.024 and 0.048 are seen; 0.043 and 0.089 with the sun's direction as it is first found.
+    assert_eq!(outside.surroundings, Surroundings::Far);
+    let [angle, off] = sunny.errors(outside.sun);
+    // 0.36 to 0.44 and 0.12 to 0.20 are seen with three seeds.
+    assert!(angle < 1.0, "{angle}");
+    assert!(off < 0.3, "{off}");
     let errors = relative_errors(&estimate, &sunny.materials);
     assert!(errors[errors.len() / 2] < 0.035, "{errors:?}");
     assert!(errors[errors.len() - 1] < 0.07, "{errors:?}");
@@ -192,16 +192,30 @@ fn a_sun_is_found_beyond_the_box_around_a_scan() {
     let estimate = sunny.solved(true);
     let outside = estimate.outside.as_ref().expect("the sky is seen");
     assert!(matches!(outside.surroundings, Surroundings::Box { .. }));
-    let found = outside.sun.expect("a sun");
-    let angle = found.direction.angle_between(sunny.sun).to_degrees();
-    let ratio = found.irradiance / sunny.irradiance;
-    println!("{angle}° off, {ratio} of its irradiance");
+    let [angle, off] = sunny.errors(outside.sun);
     assert!(angle < 3.0, "{angle}");
-    // 0.88 to 0.92 are seen.
-    assert!((ratio - 1.0).abs().max_element() < 0.2, "{ratio}");
+    assert!(off < 0.2, "{off}");
     // 0.018 is seen.
     let errors = relative_errors(&estimate, &sunny.materials);
     assert!(errors[errors.len() / 2] < 0.04, "{errors:?}");
+}
+
+/// It is then not a pixel of the sky's map, whose shadows would be blurred.
+#[test]
+fn a_sun_that_a_photograph_shows_stands_where_it_is_seen() {
+    let towards = Vec3::new(0.3, 0.25, 1.0);
+    let middle = DVec3::new(0.1, 0.2, -0.3);
+    let looking = (middle, middle + towards.as_dvec3());
+    let sunny = Sunny::new(towards, &[views(), vec![looking]].concat());
+    let estimate = sunny.solved(false);
+    let outside = estimate.outside.as_ref().expect("the sky is seen");
+    let [angle, off] = sunny.errors(outside.sun);
+    // 0.07 and 0.015 are seen.
+    assert!(angle < 0.5, "{angle}");
+    assert!(off < 0.05, "{off}");
+    let brightest = outside.pixels.iter().map(|p| p.max_element());
+    let brightest = brightest.fold(0.0, f32::max);
+    assert!(brightest < 20.0, "{brightest}");
 }
 
 /// The same views twice, the second time overexposed: where the first measured the sky, its bound counts for nothing.

@@ -21,7 +21,7 @@ pub struct OutsideGrid {
     pub up: Vec3,
     /// Distance of the outside light, for parallax.
     pub surroundings: Surroundings,
-    /// The unit direction towards the sun, if one was found. It adds to the pixel that it stands in.
+    /// The unit direction towards the sun, if one was found.
     pub sun: Option<Vec3>,
 }
 

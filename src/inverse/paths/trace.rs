@@ -20,6 +20,7 @@ use crate::transport::arrival::RayCount;
 use crate::transport::emitters::Emitters;
 use crate::transport::material::Lobe;
 use crate::transport::path::power_heuristic;
+use crate::transport::sun;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use std::f32::consts::{FRAC_1_PI, PI};
@@ -189,7 +190,7 @@ impl Tracer<'_> {
                 rays += if pick < sky {
                     self.sky_sample(&surface, choice, [u, v], &mut vertex)
                 } else if pick < sky + sun {
-                    self.sun_sample(&surface, &mut vertex)
+                    self.sun_sample(&surface, [u, v], &mut vertex)
                 } else {
                     self.light_sample(&surface, choice, [u, v], &mut vertex)
                 };
@@ -332,10 +333,11 @@ impl Tracer<'_> {
     }
 
     /// Adds light of the sun to a vertex; returns the number of rays. No other sample reaches the sun, so its weight is one.
-    fn sun_sample(&self, surface: &Surface, vertex: &mut Vertex) -> u64 {
-        let Some((grid, wi)) = self.outside.and_then(|grid| Some((grid, grid.sun?))) else {
+    fn sun_sample(&self, surface: &Surface, u: [f32; 2], vertex: &mut Vertex) -> u64 {
+        let Some((grid, towards)) = self.outside.and_then(|grid| Some((grid, grid.sun?))) else {
             return 0;
         };
+        let wi = sun::sample(towards, u);
         if (self.sky).is_some_and(|sky| !sky.is_open(surface.leave(wi), wi)) {
             return 0;
         }

@@ -6,7 +6,7 @@ use crate::inverse::outside::MeasuredOutside;
 use crate::inverse::pipeline::Pipeline;
 use crate::inverse::roles::Role;
 use crate::math::color::luminance;
-use crate::transport::environment::{direction_of, pixel_of, row_solid_angle};
+use crate::transport::environment::direction_of;
 use crate::transport::sun::Sun;
 use crate::transport::surroundings::Surroundings;
 use glam::{DVec3, Vec3};
@@ -18,9 +18,6 @@ const UNKNOWN_ALBEDO: f32 = 0.2 * ALBEDO_DEVIATION;
 const UNKNOWN_EMISSION: f32 = 0.5;
 /// Lamps that fewer pixels see get a remark.
 const FEW_PIXELS: u64 = 19;
-
-/// Columns and rows of a map with a sun, if no photograph measures it: a pixel of 1.4 degrees, not much wider than the sun.
-const SUN_MAP: [usize; 2] = [256, 128];
 
 /// Relative difference in radiance, and difference of an albedo from one, below which a wall may be confused with a lamp.
 const WHITE: f32 = 0.01;
@@ -97,11 +94,7 @@ impl Pipeline<'_, '_> {
         let (unknowns, grid, sky) = (&self.unknowns, self.outside, self.sky.as_ref());
         let emission = |surface: u32| unknowns.emission[surface as usize];
         let elsewhere = |direction| emission(grid.surface(direction));
-        let [width, height] = match (sky, grid.sun) {
-            (Some(sky), _) => sky.map().size(),
-            (None, Some(_)) => SUN_MAP,
-            (None, None) => [grid.width, grid.height],
-        };
+        let [width, height] = sky.map_or([grid.width, grid.height], |sky| sky.map().size());
         // On a box, light of one point is not that of one direction: a window sends the sky's light down and the ground's up.
         let boxed = grid.surroundings != Surroundings::Far;
         let filled = |towards: Option<Vec3>| -> Vec<Vec3> {
@@ -112,33 +105,26 @@ impl Pipeline<'_, '_> {
                     .collect(),
             }
         };
-        let mut pixels = filled(boxed.then_some(-grid.up));
+        let pixels = filled(boxed.then_some(-grid.up));
         let above = (boxed && sky.is_some()).then(|| filled(Some(grid.up)));
         let sun = grid.sun.map(|direction| Sun {
             direction,
             irradiance: emission(grid.sun_surface()) * PI,
         });
         let sun = sun.filter(|sun| sun.irradiance != Vec3::ZERO);
-        if let Some(Sun {
-            direction,
-            irradiance,
-        }) = sun.filter(|_| !boxed)
-        {
-            let pixel = pixel_of(width, height, direction);
-            let solid_angle = row_solid_angle(pixel / width, width, height) as f32;
-            pixels[pixel] += irradiance / solid_angle;
-        }
         let shines = |pixels: &[Vec3]| pixels.iter().any(|&p| p != Vec3::ZERO);
-        let beyond = sun.filter(|_| boxed);
-        let any = shines(&pixels) || above.as_deref().is_some_and(shines) || beyond.is_some();
+        let any = shines(&pixels) || above.as_deref().is_some_and(shines) || sun.is_some();
         any.then_some(Outside {
             width: width as u32,
             height: height as u32,
             pixels,
             above,
             surroundings: grid.surroundings,
-            sun: beyond,
-            openings: beyond.and(sky).map(MeasuredOutside::openings),
+            sun,
+            openings: sun
+                .filter(|_| boxed)
+                .and(sky)
+                .map(MeasuredOutside::openings),
         })
     }
 

@@ -20,8 +20,7 @@ use glam::{DVec3, Vec3};
 
 /// Least fraction of paths that leave the mesh for which outside light is tried.
 const ESCAPING: f64 = 1e-3;
-/// Least fall of the squared error by outside light, and then by a sun, relative to that without either; and by a scan's outside
-/// light without measurements.
+/// Least relative fall of the squared error by outside light, then by a sun, and by a scan's outside light without measurements.
 const OUTSIDE_GAIN: f64 = 0.03;
 /// Greatest number of times that a sun's direction is refined.
 const REFINEMENTS: usize = 2;
@@ -117,8 +116,7 @@ impl Pipeline<'_, '_> {
         let before = Misfit::new(field.cache, &without.unknowns);
         let sky = self.measured_outside(Surroundings::Far);
         let plain = self.fit_open(sky, Surroundings::Far, None, field)?;
-        let needed = OUTSIDE_GAIN * before.mean();
-        let best = self.with_sun(without.clone(), plain, needed, field)?;
+        let best = self.with_sun(without.clone(), plain, field)?;
         if !before.falls(&best.misfit, OUTSIDE_GAIN * before.mean()) {
             self.go_back_to(without);
             return Ok("is not called for".to_owned());
@@ -152,8 +150,7 @@ impl Pipeline<'_, '_> {
         }
         self.go_back_to(without.clone());
         let plain = self.fit_open(sky, around, None, field)?;
-        let needed = OUTSIDE_GAIN * plain.misfit.mean();
-        let measured = self.with_sun(without, plain, needed, field)?;
+        let measured = self.with_sun(without, plain, field)?;
         if unmeasured.misfit.mean() < (1.0 - OUTSIDE_GAIN) * measured.misfit.mean() {
             self.go_back_to(unmeasured.found);
             return Ok(format!(
@@ -169,14 +166,8 @@ impl Pipeline<'_, '_> {
     }
 
     /// Searches for a sun after a fit of outside light without one, and fits with the best candidate. Returns the fit with the sun
-    /// if it lowers the squared error by `needed` and the sun shines, else that without.
-    fn with_sun(
-        &mut self,
-        without: Found,
-        mut plain: Trial,
-        needed: f64,
-        field: LightField,
-    ) -> Result<Trial> {
+    /// if it lowers the squared error clearly and the sun shines, else that without.
+    fn with_sun(&mut self, without: Found, mut plain: Trial, field: LightField) -> Result<Trial> {
         let sun = self.find_sun(plain.paths.take().as_ref().unwrap_or(field.cache));
         if sun.is_none() {
             return Ok(plain);
@@ -203,8 +194,8 @@ impl Pipeline<'_, '_> {
             };
             sunny = refined;
         }
-        let fall = plain.misfit.mean() - sunny.misfit.mean();
-        Ok(match fall > needed && self.sun_shines() {
+        let falls = sunny.misfit.mean() < (1.0 - OUTSIDE_GAIN) * plain.misfit.mean();
+        Ok(match falls && self.sun_shines() {
             true => sunny,
             false => plain,
         })

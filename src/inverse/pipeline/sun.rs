@@ -37,20 +37,19 @@ const SKIES: std::ops::RangeInclusive<i32> = -1..=4;
 const MIN_FALL: f64 = 25.0 + 20.0;
 
 /// Columns of the maps in which the direction of a fitted sun is refined, and how far from it candidates are, in their pixels.
-const FINE_COLUMNS: [usize; 2] = [512, 1024];
+const FINE_COLUMNS: [usize; 3] = [512, 1024, 2048];
 const FINE_REACH: f32 = 5.0;
-/// Clusters that a fitted sun is refined with, at most.
-const FINE_CLUSTERS: usize = 8192;
+/// Clusters that a fitted sun is refined with, at most, and pixels of each: shadow edges cross clusters.
+const FINE_CLUSTERS: usize = 2048;
+const FINE_PIXELS: usize = 8;
 /// Irradiances that are tried with each direction, over that of the fitted sun: powers of the eighth root of two.
 const FINE_IRRADIANCES: std::ops::RangeInclusive<i32> = -4..=4;
 
 /// One cluster of pixels, reduced to what the search needs.
 struct Patch {
     object: usize,
-    /// Its middle pixel's surface point.
-    point: Vec3,
-    normal: Vec3,
-    corners: [Vec3; 3],
+    /// Surface points of some of its pixels.
+    spots: Vec<Spot>,
     /// Photographed luminance, and whether it is a lower bound.
     measured: f64,
     censored: bool,
@@ -60,19 +59,24 @@ struct Patch {
 }
 
 impl Patch {
-    /// The patch of a cluster; `None` if nothing of the mesh is seen there.
-    fn new(scene: &Scene, cluster: &Cluster, [dark, bright]: [&Linearised; 2]) -> Option<Self> {
-        let pixel = cluster.pixels[cluster.pixels.len() / 2];
+    /// The patch of a cluster with spots in `pixels` of its pixels; `None` if nothing of the mesh is seen there.
+    fn new(
+        scene: &Scene,
+        cluster: &Cluster,
+        pixels: usize,
+        [dark, bright]: [&Linearised; 2],
+    ) -> Option<Self> {
         let camera = &scene.cameras[cluster.frame as usize];
-        let ray = camera.ray(camera.corner(pixel as usize) + 0.5);
-        let hit = scene.intersect(&ray)?;
-        let normal = scene.normals[hit.triangle as usize];
+        let all = &cluster.pixels;
+        let pixels = pixels.min(all.len());
+        let spots: Vec<Spot> = (0..pixels)
+            .map(|i| all[(2 * i + 1) * all.len() / (2 * pixels)])
+            .filter_map(|pixel| Spot::new(scene, &camera.ray(camera.corner(pixel as usize) + 0.5)))
+            .collect();
         let measured = f64::from(luminance(cluster.measured));
-        (measured > 0.0).then_some(Self {
+        (measured > 0.0 && !spots.is_empty()).then_some(Self {
             object: cluster.object as usize,
-            point: scene.point(&hit),
-            normal: normal * -normal.dot(ray.direction).signum(),
-            corners: scene.corners(hit.triangle),
+            spots,
             measured,
             censored: dark.censored.any(),
             room: luminance_f64(dark.own).max(0.0),
@@ -80,15 +84,10 @@ impl Patch {
         })
     }
 
-    /// Cosine of the incidence of a sun's light; zero in shadow.
+    /// Mean over the spots of the cosine of the incidence of a sun's light.
     fn cosine(&self, scene: &Scene, sky: Option<&MeasuredOutside>, towards: Vec3) -> f64 {
-        let cosine = self.normal.dot(towards);
-        let origin = offset_origin(self.point, self.normal, &self.corners, towards);
-        let is_open = || sky.is_none_or(|sky| sky.is_open(origin, towards));
-        match cosine > 0.0 && is_open() && !scene.occluded(&Ray::new(origin, towards)) {
-            true => f64::from(cosine),
-            false => 0.0,
-        }
+        let cosines = self.spots.iter().map(|s| s.cosine(scene, sky, towards));
+        cosines.sum::<f64>() / self.spots.len() as f64
     }
 
     /// Squared residual of a predicted luminance, over its variance.
@@ -102,6 +101,36 @@ impl Patch {
 
     fn variance(&self, dark: f64) -> f64 {
         CLUSTER_ERROR * CLUSTER_ERROR * (self.measured * self.measured + dark * dark)
+    }
+}
+
+/// A surface point that a pixel sees.
+struct Spot {
+    point: Vec3,
+    normal: Vec3,
+    corners: [Vec3; 3],
+}
+
+impl Spot {
+    fn new(scene: &Scene, ray: &Ray) -> Option<Self> {
+        let hit = scene.intersect(ray)?;
+        let normal = scene.normals[hit.triangle as usize];
+        Some(Self {
+            point: scene.point(&hit),
+            normal: normal * -normal.dot(ray.direction).signum(),
+            corners: scene.corners(hit.triangle),
+        })
+    }
+
+    /// Cosine of the incidence of a sun's light; zero in shadow.
+    fn cosine(&self, scene: &Scene, sky: Option<&MeasuredOutside>, towards: Vec3) -> f64 {
+        let cosine = self.normal.dot(towards);
+        let origin = offset_origin(self.point, self.normal, &self.corners, towards);
+        let is_open = || sky.is_none_or(|sky| sky.is_open(origin, towards));
+        match cosine > 0.0 && is_open() && !scene.occluded(&Ray::new(origin, towards)) {
+            true => f64::from(cosine),
+            false => 0.0,
+        }
     }
 }
 
@@ -210,6 +239,9 @@ impl Pipeline<'_, '_> {
         if self.monitor.settings.light_sampling == LightSampling::Bsdf {
             return None;
         }
+        if let Some(sun) = self.sky.as_ref().and_then(|sky| sky.seen_sun()) {
+            return Some(sun);
+        }
         let objects = self.problem.scene.objects.len();
         // All objects are reflectors of one albedo, under a black sky and under a white one.
         let residuals = [0.0, 1.0].map(|sky| {
@@ -221,12 +253,10 @@ impl Pipeline<'_, '_> {
             assumed.emission[objects..].fill(Vec3::splat(sky));
             cache.residuals(&assumed)
         });
-        let search = self.search(cache, residuals.each_ref());
-        // A photograph that looks into a direction far away shows no sun there, unless it saturates.
+        let search = self.search(cache, 1, residuals.each_ref());
+        // A photograph that looks into a direction far away would show a sun there.
         let far = (self.sky.as_ref()).filter(|_| self.outside.surroundings == Surroundings::Far);
-        let may_hold = |d: Vec3| {
-            far.is_none_or(|sky| sky.at(Vec3::ZERO, d).is_none() || sky.is_bound(Vec3::ZERO, d))
-        };
+        let may_hold = |d: Vec3| far.is_none_or(|sky| sky.may_hold_sun(d));
         let (direction, fall) = search.best(self.problem.scene.up, may_hold)?;
         (fall >= MIN_FALL).then_some(direction)
     }
@@ -238,7 +268,7 @@ impl Pipeline<'_, '_> {
         let irradiance = luminance_f64(self.unknowns.emission[surface].as_dvec3());
         let mut without = self.unknowns.clone();
         without.emission[surface] = Vec3::ZERO;
-        let search = self.search(cache, [&cache.residuals(&without); 2]);
+        let search = self.search(cache, FINE_PIXELS, [&cache.residuals(&without); 2]);
         let mut best = sun;
         for columns in FINE_COLUMNS {
             let reach = (FINE_REACH * std::f32::consts::TAU / columns as f32).cos();
@@ -254,14 +284,19 @@ impl Pipeline<'_, '_> {
     }
 
     /// The clusters of seen reflectors, lit as in two assumed states. What they get more in the second one is a sky's light.
-    fn search(&self, cache: &PathCache, residuals: [&Vec<Linearised>; 2]) -> Search<'_> {
+    fn search(
+        &self,
+        cache: &PathCache,
+        pixels: usize,
+        residuals: [&Vec<Linearised>; 2],
+    ) -> Search<'_> {
         let scene = &*self.problem.scene;
         let mut patches: Vec<Patch> = (cache.clusters.iter().enumerate())
             .filter_map(|(i, cached)| {
                 let cluster = &cached.cluster;
                 let reflects = self.roles[cluster.object as usize] == Role::Reflector;
                 let radiances = residuals.map(|of_state| &of_state[i]);
-                reflects.then(|| Patch::new(scene, cluster, radiances))?
+                reflects.then(|| Patch::new(scene, cluster, pixels, radiances))?
             })
             .collect();
         patches.sort_by_key(|patch| patch.object);

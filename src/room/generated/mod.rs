@@ -23,6 +23,7 @@ use crate::export::new_folder::NewFolder;
 use crate::math::picture::Picture;
 use crate::room::photographs::{self, Rendering};
 use crate::room::{Room, write_truth};
+use crate::transport::environment::{pixel_of, row_solid_angle};
 use furnisher::Furnisher;
 use photographed::Draft;
 use serde::{Deserialize, Serialize};
@@ -106,7 +107,7 @@ fn photographed(draft: Draft) -> Result<Generated> {
 }
 
 /// Writes room `seed` of a family into a new or empty folder, atomically: transforms.json, mesh.obj, images, truth/outside.exr if it
-/// has light from outside, and truth.json and truth/albedo_NNN.exr where the mesh is the room's own.
+/// has light from outside (a sun lights one pixel), and truth.json and truth/albedo_NNN.exr where the mesh is the room's own.
 ///
 /// # Errors
 /// The room cannot be generated (see [`Family::generate`]), the folder is not empty, or a file cannot be written.
@@ -121,7 +122,13 @@ pub fn write(out: &Path, family: Family, seed: u64, size: [u32; 2]) -> Result<()
     }
     if let Some(outside) = &room.lit.outside {
         let [width, height] = outside.size().map(|side| side as u32);
-        let pixels = outside.pixels().to_vec();
+        let mut pixels = outside.pixels().to_vec();
+        if let Some(sun) = outside.sun() {
+            let [columns, rows] = outside.size();
+            let pixel = pixel_of(columns, rows, sun.direction);
+            let solid_angle = row_solid_angle(pixel / columns, columns, rows) as f32;
+            pixels[pixel] += sun.irradiance / solid_angle;
+        }
         let picture = Picture {
             width,
             height,

@@ -2,12 +2,13 @@
 
 use crate::room::generated::furnisher::{Furnisher, walls};
 use crate::room::shape::Modeller;
-use crate::transport::environment::{Environment, direction_of, pixel_of, row_solid_angle};
+use crate::transport::environment::{Environment, direction_of};
+use crate::transport::sun::Sun;
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// Width and height of the environment map; a pixel, such as the sun, has about three degrees.
+/// Width and height of the environment map; a pixel has about three degrees.
 const MAP: [usize; 2] = [128, 64];
 
 /// An opening in a wall, in fractions of the wall's width and height.
@@ -133,7 +134,7 @@ fn sky(f: &mut Furnisher, level: f64, opening: &Opening) -> Option<Environment> 
     let ground = f.color(1.0, 0.5) * f.between(0.1, 0.4) as f32;
     let horizon = f.between(0.0, 1.0) as f32;
     let [width, height] = MAP;
-    let mut pixels: Vec<Vec3> = (0..width * height)
+    let pixels: Vec<Vec3> = (0..width * height)
         .map(|pixel| {
             let up = direction_of(width, height, pixel).y;
             let light = match up > 0.0 {
@@ -151,12 +152,10 @@ fn sky(f: &mut Furnisher, level: f64, opening: &Opening) -> Option<Environment> 
     // The sun's irradiance relative to that of a uniform sky.
     let strength = f.scaled(0.3, 6.0);
     let warmth = f.color(1.0, 0.3);
-    if shines {
-        let (sin, cos) = elevation.sin_cos();
-        let towards = DVec3::new(cos * azimuth.cos(), sin, cos * azimuth.sin()).as_vec3();
-        let pixel = pixel_of(width, height, towards);
-        let solid_angle = row_solid_angle(pixel / width, width, height);
-        pixels[pixel] += warmth * (strength * PI * level / solid_angle) as f32;
-    }
-    Environment::new(width, height, pixels)
+    let (sin, cos) = elevation.sin_cos();
+    let sun = shines.then(|| Sun {
+        direction: DVec3::new(cos * azimuth.cos(), sin, cos * azimuth.sin()).as_vec3(),
+        irradiance: warmth * (strength * PI * level) as f32,
+    });
+    Environment::new(width, height, pixels)?.with_sun(sun, None)
 }

@@ -77,7 +77,7 @@ pub struct OutsideSummary {
     pub brightest: Option<f32>,
     /// Its distance.
     pub from: &'static str,
-    /// The sun beyond a box. Far away, the sun is a pixel of the map.
+    /// The sun beside the map.
     pub sun: Option<Sun>,
 }
 
