@@ -166,10 +166,10 @@ impl Pipeline<'_, '_> {
                 rounds.sums = Accumulated::default();
                 continue;
             }
-            let reported = self.reported();
-            let fraction = (aim.median / reported.all[0]).powi(2);
+            let done = self.reported().done(aim, rounds.sums.rounds());
+            let fraction = done.max(f64::from(rounds.next) / f64::from(most));
             self.monitor.progress.fraction = Some(fraction.min(1.0) as f32);
-            if reported.is_enough(aim, rounds.sums.rounds()) {
+            if done >= 1.0 {
                 outcome = Termination::Converged;
                 break;
             }
@@ -312,12 +312,15 @@ struct Reported {
 }
 
 impl Reported {
-    /// Whether more paths would gain little: the error is below its target, or the part due to path noise is negligible.
-    fn is_enough(&self, aim: Aim, rounds: u32) -> bool {
+    /// The rounds that were added, as a fraction of those after which more would gain little: the error is then at its target, or
+    /// the part due to path noise is negligible. Variances fall in proportion to the number of rounds.
+    fn done(&self, aim: Aim, rounds: u32) -> f64 {
         let targets = [aim.median, aim.tail];
         let told = f64::from(rounds.min(TELLING_ROUNDS)) / f64::from(TELLING_ROUNDS);
-        let negligible = |i: usize| self.of_paths[i] < self.all[i] * aim.path_noise * told;
-        (0..2).all(|i| self.all[i] < targets[i] || negligible(i))
+        let error = |i: usize| targets[i] / self.all[i];
+        let noise = |i: usize| self.all[i] * aim.path_noise * told / self.of_paths[i];
+        let each = [0, 1].map(|i| error(i).max(noise(i)).powi(2));
+        each[0].min(each[1])
     }
 }
 
@@ -344,6 +347,23 @@ fn is_nonlinear(from: &Unknowns, to: &Unknowns, errors: &StandardErrors, objects
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rounds_are_done_at_the_target_or_once_their_noise_is_negligible() {
+        let aim = Aim {
+            median: 0.01,
+            tail: 0.05,
+            path_noise: 0.5,
+        };
+        let done = |all: [f64; 2], of_paths: [f64; 2]| Reported { all, of_paths }.done(aim, 4);
+        // Both quantiles count, and each by what ends it first.
+        assert!((done([0.02, 0.04], [0.02, 0.04]) - 0.25).abs() < 1e-12);
+        assert!((done([0.02, 0.04], [0.02, 0.01]) - 0.25).abs() < 1e-12);
+        assert!(done([0.02, 0.04], [0.005, 0.04]) > 1.0);
+        assert!((done([0.02, 0.2], [0.005, 0.2]) - 0.25).abs() < 1e-12);
+        // Nothing that is counted is nothing to improve.
+        assert!(done([0.0; 2], [0.0; 2]) >= 1.0);
+    }
 
     #[test]
     fn a_step_is_nonlinear_by_its_square_against_its_own_error() {
