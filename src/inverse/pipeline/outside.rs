@@ -194,7 +194,12 @@ impl Pipeline<'_, '_> {
             };
             sunny = refined;
         }
-        let falls = sunny.misfit.mean() < (1.0 - OUTSIDE_GAIN) * plain.misfit.mean();
+        // The noise of a scan's squared error, with that of its mesh, would hide most suns.
+        let needed = OUTSIDE_GAIN * plain.misfit.mean();
+        let falls = match self.problem.scene.scanned {
+            true => plain.misfit.mean() - sunny.misfit.mean() > needed,
+            false => plain.misfit.falls(&sunny.misfit, needed),
+        };
         Ok(match falls && self.sun_shines() {
             true => sunny,
             false => plain,
