@@ -194,7 +194,8 @@ impl Pipeline<'_, '_> {
             };
             sunny = refined;
         }
-        // The noise of a scan's squared error, with that of its mesh, would hide most suns.
+        // A scan's mesh adds to the noise, which would hide suns, as in room 22 of `relit trade --rooms 24 --family scanned --preset
+        // preview`.
         let needed = OUTSIDE_GAIN * plain.misfit.mean();
         let falls = match self.problem.scene.scanned {
             true => plain.misfit.mean() - sunny.misfit.mean() > needed,
