@@ -15,7 +15,7 @@ use relit::inverse::settings::{Preset, Settings};
 use relit::inverse::solve;
 use relit::inverse::solver::{Checkpoint, Control, Observer, Progress, Solution};
 use relit::scene::Scene;
-use relit::transport::environment::Environment;
+use relit::transport::environment::{Environment, direction_of, pixel_of};
 use relit::transport::material::Material;
 use relit::transport::sun::Sun;
 use relit::transport::surroundings::Surroundings;
@@ -127,7 +127,10 @@ struct Sunny {
     sun: Sun,
 }
 
-static SUNNY: LazyLock<Sunny> = LazyLock::new(|| Sunny::new(Vec3::new(0.2, 0.8, 0.6), &views()));
+static SUNNY: LazyLock<Sunny> = LazyLock::new(|| {
+    let pixel = pixel_of(256, 128, Vec3::new(0.2, 0.8, 0.6));
+    Sunny::new(direction_of(256, 128, pixel), &views())
+});
 
 impl Sunny {
     fn new(towards: Vec3, views: &[View]) -> Self {
@@ -177,13 +180,13 @@ fn a_sun_through_the_window_is_found_by_where_its_light_falls() {
     let outside = estimate.outside.as_ref().expect("the sky is seen");
     assert_eq!(outside.surroundings, Surroundings::Far);
     let [angle, off] = sunny.errors(outside.sun);
-    // 0.36 to 0.44 and 0.12 to 0.20 are seen with three seeds.
+    // 0.10 and 0.042 are seen; 0.73 and 0.16 with another seed.
     assert!(angle < 1.0, "{angle}");
-    assert!(off < 0.3, "{off}");
-    // 0.020 and 0.118 are seen: sun and unseen sky can hardly be told apart where both fall.
+    assert!(off < 0.1, "{off}");
+    // 0.018 and 0.042 are seen; 0.033 and 0.152 with another seed: sun and unseen sky are hard to tell apart where both fall.
     let errors = relative_errors(&estimate, &sunny.materials);
     assert!(errors[errors.len() / 2] < 0.035, "{errors:?}");
-    assert!(errors[errors.len() - 1] < 0.15, "{errors:?}");
+    assert!(errors[errors.len() - 1] < 0.07, "{errors:?}");
 }
 
 /// Beyond the box around a scan it is a disc of its own.
