@@ -132,12 +132,12 @@ impl MeasuredOutside {
             || half.is_brighter(cell, self.map.pixels_from(direction), self.room)
     }
 
-    /// [`Self::is_open`] of each cell for light from above the horizon.
-    pub fn openings(&self) -> Vec<bool> {
+    /// [`Self::is_open`] of each cell for light from above the horizon; `None` far away, where all are open.
+    pub fn openings(&self) -> Option<Vec<bool>> {
         let (half, pixels) = (self.half(self.up), self.map.pixels_from(self.up));
-        (0..pixels.len())
-            .map(|cell| half.is_brighter(cell, pixels, self.room))
-            .collect()
+        let is_open = |cell| half.is_brighter(cell, pixels, self.room);
+        let boxed = self.map.surroundings() != Surroundings::Far;
+        boxed.then(|| (0..pixels.len()).map(is_open).collect())
     }
 
     fn cell(&self, origin: Vec3, direction: Vec3) -> (&Half, usize) {
@@ -344,7 +344,7 @@ mod tests {
         assert_eq!(measured.mean_bound(), Vec3::splat(3.0));
         // Far away a sun may stand anywhere; through a box it shines where the photographs are saturated.
         assert!(measured.is_open(Vec3::ZERO, at(-0.1)));
-        assert_eq!(measured.openings(), [true, false]);
+        assert_eq!(measured.openings(), None);
         let around = Surroundings::around([Vec3::NEG_ONE, Vec3::ONE].into_iter()).expect("points");
         let boxed = MeasuredOutside {
             map: measured.map.clone().around(around),
@@ -352,6 +352,7 @@ mod tests {
         };
         assert!(!boxed.is_open(Vec3::ZERO, at(-0.1)));
         assert!(boxed.is_open(Vec3::ZERO, at(0.1)));
+        assert_eq!(boxed.openings(), Some(vec![true, false]));
         let filled = |towards| measured.filled(Some(towards), |d| d.abs(), |_| Vec3::splat(7.0));
         let seven = Vec3::splat(7.0);
         assert_eq!(filled(Vec3::NEG_Y), [Vec3::splat(0.5), seven]);

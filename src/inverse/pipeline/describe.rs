@@ -121,10 +121,7 @@ impl Pipeline<'_, '_> {
             above,
             surroundings: grid.surroundings,
             sun,
-            openings: sun
-                .filter(|_| boxed)
-                .and(sky)
-                .map(MeasuredOutside::openings),
+            openings: sun.and(sky).and_then(MeasuredOutside::openings),
         })
     }
 

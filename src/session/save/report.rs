@@ -10,6 +10,7 @@ use crate::session::save::memory::peak_memory_bytes;
 use crate::session::save::named::Named;
 use crate::session::save::results::Results;
 use crate::transport::denoise::Denoiser;
+use crate::transport::environment::row_solid_angle;
 use crate::transport::sun::Sun;
 use crate::transport::surroundings::Surroundings;
 use serde::Serialize;
@@ -120,11 +121,10 @@ impl Report {
             stages: progress.stages.clone(),
             objects: Named::objects(&capture.scene, estimate),
             outside_light: estimate.outside.as_ref().map(|outside| {
-                let edge = |row: usize| (PI * row as f64 / f64::from(outside.height)).cos();
-                let row_angle =
-                    |row| (edge(row) - edge(row + 1)) / (2.0 * f64::from(outside.width));
+                let [width, height] = [outside.width, outside.height].map(|side| side as usize);
+                let share = |row| row_solid_angle(row, width, height) / (4.0 * PI);
                 let mean = (outside.means().enumerate())
-                    .map(|(i, p)| p.as_dvec3() * row_angle(i / outside.width.max(1) as usize))
+                    .map(|(i, p)| p.as_dvec3() * share(i / width.max(1)))
                     .sum::<glam::DVec3>();
                 let brightest = outside.means().map(luminance);
                 OutsideSummary {
