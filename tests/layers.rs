@@ -128,9 +128,8 @@ const INSIDE: &[(&str, &[&[&str]])] = &[
     (
         "inverse",
         &[
-            &[
-                "unknowns", "known", "roles", "settings", "estimate", "outside",
-            ],
+            &["unknowns", "known", "roles", "settings", "estimate", "sky"],
+            &["outside"],
             &["solver", "loss"],
             &["monitor", "paths", "lobe", "texture"],
             &["fit"],

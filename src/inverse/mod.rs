@@ -17,6 +17,7 @@ pub mod paths;
 pub mod pipeline;
 pub mod roles;
 pub mod settings;
+pub mod sky;
 pub mod solver;
 pub mod texture;
 pub mod unknowns;

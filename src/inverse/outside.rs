@@ -5,7 +5,9 @@
 
 use crate::calibrate::gbuffer::GBuffer;
 use crate::calibrate::problem::Problem;
+use crate::inverse::sky::{ExpectedSky, Map, Seen, solid_angle};
 use crate::math::color::luminance;
+use crate::scene::camera::level_up;
 use crate::transport::environment::{Environment, direction_of, pixel_of};
 use crate::transport::surroundings::Surroundings;
 use glam::{DVec3, Vec3};
@@ -21,6 +23,9 @@ const SUN_LIKE: f32 = 1e3;
 /// Unseen directions take the mean of a block of up to 2^(LEVELS − 1) cells a side.
 const LEVELS: usize = 3;
 
+/// Rows of the blocks of cells whose means tell what unseen directions look like: 10° each.
+const BLOCK_ROWS: usize = 18;
+
 /// Mean measured radiance by direction; black in unmeasured directions.
 #[derive(Debug, Clone)]
 pub struct MeasuredOutside {
@@ -34,6 +39,8 @@ pub struct MeasuredOutside {
     room: f32,
     /// The unit direction in which unsaturated photographs show the sun.
     sun: Option<Vec3>,
+    /// What is expected of unmeasured directions.
+    expected: Option<ExpectedSky>,
 }
 
 /// Cells of light from one side of the horizon.
@@ -51,8 +58,14 @@ struct Half {
 type Sums = [(DVec3, u32); 2];
 
 impl MeasuredOutside {
-    /// Accumulates the pixels in the fit that see nothing of the mesh; `None` if there are none.
-    pub fn new(problem: &Problem, gbuffer: &GBuffer, surroundings: Surroundings) -> Option<Self> {
+    /// Accumulates the pixels in the fit that see nothing of the mesh; `None` if there are none. `grid` is the number of columns
+    /// and rows of the unknowns of unmeasured light.
+    pub fn new(
+        problem: &Problem,
+        gbuffer: &GBuffer,
+        surroundings: Surroundings,
+        grid: [usize; 2],
+    ) -> Option<Self> {
         let scene = &problem.scene;
         let camera = scene.cameras.first()?;
         let columns = 2.0 * PI * camera.intrinsics.fx / CELL_PIXELS;
@@ -89,13 +102,16 @@ impl MeasuredOutside {
         }
         let [(below, dark), (above, bright)] = sums.map(|sums| Half::new(width, height, &sums));
         let map = Environment::new(width, height, dark)?.around(surroundings);
-        Some(Self {
+        let mut outside = Self {
             map: map.with_above(bright, scene.up)?,
             halves: [below, above],
             up: scene.up,
             room,
             sun: sun.try_normalize(),
-        })
+            expected: None,
+        };
+        outside.expected = outside.expect(level_up(&scene.cameras, scene.up), grid);
+        Some(outside)
     }
 
     /// Radiance along a ray, or its lower bound; `None` in unmeasured directions.
@@ -165,9 +181,40 @@ impl MeasuredOutside {
         &self.map
     }
 
-    /// Expected radiance of an unmeasured direction: the mean over measured directions within ± `band` / 2 radians of its
-    /// elevation, or over all measured directions. And whether its colour is known: most of these are no lower bounds.
-    pub fn expected(&self, direction: Vec3, band: f64) -> (Vec3, bool) {
+    /// What is expected of the unmeasured light; `None` if all that is measured is black.
+    pub fn expected(&self) -> Option<&ExpectedSky> {
+        self.expected.as_ref()
+    }
+
+    /// Unmeasured radiance along a ray over the mean of its pixel of the grid, as expected.
+    #[inline]
+    pub fn shape(&self, origin: Vec3, direction: Vec3) -> f32 {
+        self.shape_of(self.map.pixel(origin, direction))
+    }
+
+    fn shape_of(&self, cell: usize) -> f32 {
+        let shape = self.expected.as_ref().map_or(&[][..], |sky| &sky.shape);
+        shape.get(cell).copied().unwrap_or(1.0)
+    }
+
+    /// What is expected of the unmeasured light: from its directions by a regression; beside saturated pixels, what is measured at
+    /// the same elevation, since how much these hide is not known.
+    fn expect(&self, up: Vec3, grid: [usize; 2]) -> Option<ExpectedSky> {
+        if self.known_cells().any(|(.., is_bound)| is_bound) {
+            let band = PI / grid[1] as f64;
+            return Some(ExpectedSky::even(grid, |d| self.mean_at(d, band)));
+        }
+        let map = Map {
+            size: self.map.size(),
+            known: &|cell, direction| self.half(direction).known[cell],
+            grid,
+        };
+        ExpectedSky::new(&self.measured(), up, &map)
+    }
+
+    /// The mean over measured directions within ± `band` / 2 radians of a direction's elevation, or over all measured directions.
+    /// And whether its colour is known: most of these are no lower bounds.
+    fn mean_at(&self, direction: Vec3, band: f64) -> (Vec3, bool) {
         let elevation_of = |d: Vec3| f64::from(d.dot(self.up).clamp(-1.0, 1.0)).asin();
         let elevation = elevation_of(direction);
         let [width, height] = self.map.size();
@@ -175,7 +222,7 @@ impl MeasuredOutside {
         let (mut near, mut all) = ((DVec3::ZERO, 0.0, 0.0), (DVec3::ZERO, 0.0, 0.0));
         for (cell, radiance, is_bound) in self.known_cells() {
             let seen = direction_of(width, height, cell);
-            let solid_angle = f64::from(1.0 - seen.y * seen.y).max(0.0).sqrt();
+            let solid_angle = solid_angle(seen);
             let radiance = radiance.as_dvec3() * solid_angle;
             let bound = if is_bound { solid_angle } else { 0.0 };
             let add = |sum: &mut (DVec3, f64, f64)| {
@@ -189,6 +236,28 @@ impl MeasuredOutside {
         let (sum, weight, bounds) = if near.1 > 0.0 { near } else { all };
         let mean = (sum / f64::max(weight, f64::MIN_POSITIVE)).as_vec3();
         (mean, 2.0 * bounds <= weight)
+    }
+
+    /// Measured light as means over blocks of cells.
+    fn measured(&self) -> Vec<Seen> {
+        let [width, height] = self.map.size();
+        let rows = BLOCK_ROWS.min(height);
+        let mut sums = vec![(DVec3::ZERO, DVec3::ZERO, 0.0); 2 * rows * rows];
+        for (cell, radiance, _) in self.known_cells() {
+            let seen = direction_of(width, height, cell);
+            let solid_angle = solid_angle(seen);
+            let sum = &mut sums[pixel_of(2 * rows, rows, seen)];
+            sum.0 += seen.as_dvec3() * solid_angle;
+            sum.1 += radiance.as_dvec3() * solid_angle;
+            sum.2 += solid_angle;
+        }
+        let block = |(direction, radiance, weight): (DVec3, DVec3, f64)| {
+            Some(Seen {
+                direction: direction.try_normalize()?.as_vec3(),
+                radiance: (radiance / weight).as_vec3(),
+            })
+        };
+        sums.into_iter().filter_map(block).collect()
     }
 
     /// Mean of the lower bounds; black if there are none.
@@ -216,7 +285,7 @@ impl MeasuredOutside {
                 match (half.known[cell], half.censored[cell]) {
                     (true, true) => radiance + excess(from),
                     (true, false) => radiance,
-                    (false, _) => elsewhere(direction),
+                    (false, _) => elsewhere(direction) * self.shape_of(cell),
                 }
             })
             .collect()
@@ -301,10 +370,11 @@ mod tests {
             up: Vec3::Y,
             room: 1.0,
             sun: None,
+            expected: None,
         };
         let at = |row: usize| {
             let direction = direction_of(width, height, row * 16 + 12);
-            measured.expected(direction, PI / 8.0).0
+            measured.mean_at(direction, PI / 8.0).0
         };
         assert!((at(2) - Vec3::splat(4.0)).length() < 1e-5);
         assert!((at(5) - Vec3::ONE).length() < 1e-5);
@@ -315,7 +385,7 @@ mod tests {
             up: direction_of(width, height, above),
             ..measured
         };
-        let off = sideways.expected(sideways.up, PI / 8.0).0 - Vec3::splat(4.0);
+        let off = sideways.mean_at(sideways.up, PI / 8.0).0 - Vec3::splat(4.0);
         assert!(off.length() < 1e-5, "{off}");
     }
 
@@ -334,6 +404,7 @@ mod tests {
             up: Vec3::Y,
             room: 1.0,
             sun: None,
+            expected: None,
         };
         let seen = direction_of(2, 1, 0);
         let at = |rise: f32| (seen + Vec3::Y * rise).normalize();

@@ -34,6 +34,14 @@ impl Unknowns {
         }
     }
 
+    /// The upper bound of a parameter: 1 for albedos. The lower bound is zero.
+    pub fn upper(&self, parameter: usize) -> f64 {
+        match parameter < self.surfaces() {
+            true => 1.0,
+            false => f64::INFINITY,
+        }
+    }
+
     /// Mutable access to the value of a parameter.
     pub fn value_mut(&mut self, parameter: usize) -> &mut Vec3 {
         match parameter.checked_sub(self.surfaces()) {

@@ -3,6 +3,12 @@
 use crate::capture::camera::{Intrinsics, Pose};
 use crate::scene::geometry::Ray;
 use glam::{DVec3, Mat3, Vec2, Vec3};
+use nalgebra::Matrix3;
+
+/// Greatest mean square of the cameras' rolls over that of their other turns at which they count as level: a tenth of the angle.
+const MAX_ROLL: f64 = 0.01;
+/// Least cosine between the level up axis and the mean one: 30°.
+const MIN_LEVEL: f32 = 0.866;
 
 /// A posed camera relative to the scene's origin.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,5 +86,69 @@ impl Camera {
     /// Unit viewing direction.
     pub fn forward(&self) -> Vec3 {
         -self.rotation.z_axis
+    }
+}
+
+/// The unit vector across the right axes of all cameras, since people hold cameras level, on the side of `up`. The mean of the
+/// cameras' own up axes leans to where most of them look. `up` if the cameras are rolled, or the result is far from it.
+pub fn level_up(cameras: &[Camera], up: Vec3) -> Vec3 {
+    let sum: Matrix3<f64> = (cameras.iter())
+        .map(|camera| camera.rotation.x_axis.as_dvec3())
+        .map(|right| Matrix3::from_fn(|i, j| right[i] * right[j]))
+        .sum();
+    let axes = sum.symmetric_eigen();
+    let mut order = [0, 1, 2];
+    order.sort_by(|a, b| axes.eigenvalues[*a].total_cmp(&axes.eigenvalues[*b]));
+    let [least, middle, _] = order.map(|i| axes.eigenvalues[i].max(0.0));
+    let across = axes.eigenvectors.column(order[0]);
+    let level = DVec3::new(across[0], across[1], across[2]).as_vec3();
+    let level = level * level.dot(up).signum();
+    let is_level = middle > 0.0 && least <= MAX_ROLL * middle && level.dot(up) > MIN_LEVEL;
+    if is_level { level } else { up }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Cameras at the origin that look in directions, with a roll each in radians.
+    fn looking<const N: usize>(views: [(Vec3, f32); N]) -> Vec<Camera> {
+        let intrinsics = Intrinsics {
+            width: 4,
+            height: 3,
+            fx: 4.0,
+            fy: 4.0,
+            cx: 2.0,
+            cy: 1.5,
+            distortion: [0.0; 4],
+        };
+        let camera = |(towards, roll): (Vec3, f32)| {
+            let back = -towards.normalize();
+            let right = Mat3::from_axis_angle(back, roll) * Vec3::Y.cross(back).normalize();
+            Camera {
+                intrinsics,
+                rotation: Mat3::from_cols(right, back.cross(right), back),
+                center: Vec3::ZERO,
+            }
+        };
+        views.map(camera).to_vec()
+    }
+
+    #[test]
+    fn cameras_that_look_down_one_way_are_level_all_the_same() {
+        let down = |x: f32| Vec3::new(x, -0.6, -1.0);
+        let mean = |cameras: &[Camera]| {
+            let sum: Vec3 = cameras.iter().map(|camera| camera.rotation.y_axis).sum();
+            sum.normalize()
+        };
+        let level = looking([(down(0.0), 0.0), (down(0.7), 0.0), (down(-0.4), 0.0)]);
+        assert!(mean(&level).dot(Vec3::Y) < 0.9);
+        assert!(level_up(&level, mean(&level)).dot(Vec3::Y) > 1.0 - 1e-6);
+        // Rolled cameras, and all looking one way, tell no more than their mean.
+        let rolled = looking([(down(0.0), 0.5), (down(0.7), -0.4), (down(-0.4), 0.2)]);
+        assert_eq!(level_up(&rolled, Vec3::Y), Vec3::Y);
+        let alike = looking([(down(0.0), 0.0), (down(0.0), 0.0)]);
+        assert_eq!(level_up(&alike, mean(&alike)), mean(&alike));
+        assert_eq!(level_up(&[], Vec3::Z), Vec3::Z);
     }
 }

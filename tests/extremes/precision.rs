@@ -185,7 +185,7 @@ fn the_fit_agrees_with_its_twin_in_f64() {
         found = again(&found.unknowns);
     }
     let scores = SparseRows::scores(&found.clusters, free.len(), &robust, |_| DVec3::ONE);
-    let errors = standard_errors(&found.equations, &scores, &free, SURFACES);
+    let errors = standard_errors(&found.equations, &scores, &free, &found.unknowns);
     let mut worst = 0.0f64;
     for channel in 0..3 {
         let twin = fit_in_f64(&cache, &free, &prior, &found.unknowns, channel);

@@ -255,7 +255,8 @@ fn a_saturated_sky_is_a_bound_only_where_nothing_measured_it() {
             settings.seed,
             usize::MAX,
         );
-        MeasuredOutside::new(&problem, &gbuffer, Surroundings::Far).expect("the sky is seen")
+        MeasuredOutside::new(&problem, &gbuffer, Surroundings::Far, [12, 6])
+            .expect("the sky is seen")
     });
     let upwards = Vec3::new(0.1, 0.3, 1.0).normalize();
     let [measured, of_both, bound] = [&once, &both, &bounds].map(|m| m.at(Vec3::ZERO, upwards));

@@ -4,12 +4,14 @@
 //! darkness. Products are therefore taken across the two independent sets A and B.
 
 use crate::inverse::fit::prior::Prior;
+use crate::inverse::fit::prior_terms::PriorTerms;
 use crate::inverse::fit::robust_weights::RobustWeights;
 use crate::inverse::fit::sparse_rows::SparseRows;
 use crate::inverse::paths::evaluate::Linearised;
 use glam::DVec3;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// Greatest number of parameters for which dense matrices are stored, 8 MB a channel. `relit trade --rooms 3 --family clutter
 /// --preset preview` takes 3.1 s a room in the median, and 4.0 s with a limit of 256. More was not tried.
@@ -108,9 +110,16 @@ impl NormalEquations {
         mean + DVec3::select(met, self.path_scatter[row] / self.signal(row), DVec3::ZERO)
     }
 
-    /// Mean and precision of the prior of the free parameter in `row`, whose index among all is `parameter`.
-    pub fn prior_of(&self, row: usize, parameter: usize) -> (DVec3, DVec3) {
-        self.prior.of(parameter, self.prior_variance(row))
+    /// The Hessian of one channel with the off-diagonal terms of the prior; empty with sparse rows. Only the lower triangle is set.
+    pub fn with_couplings(&self, prior: &PriorTerms, channel: usize) -> Cow<'_, DMatrix<f64>> {
+        let Coupling::Dense(hessian) = &self.coupling else {
+            return Cow::Owned(DMatrix::zeros(0, 0));
+        };
+        let mut hessian = Cow::Borrowed(&hessian[channel]);
+        for (row, column, value) in prior.couplings(channel) {
+            hessian.to_mut()[(row, column)] += value;
+        }
+        hessian
     }
 
     /// Root mean square of the residuals relative to the pixels' levels, over pixels and channels, without path noise.

@@ -2,10 +2,12 @@
 
 use crate::inverse::fit::equations::{Coupling, NormalEquations, per_channel};
 use crate::inverse::fit::prior::ALBEDO_DEVIATION;
+use crate::inverse::fit::prior_terms::PriorTerms;
 use crate::inverse::fit::robust_weights::RobustWeights;
 use crate::inverse::fit::sparse_rows::SparseRows;
 use crate::inverse::fit::sparse_step::SparseHessian;
 use crate::inverse::paths::evaluate::Linearised;
+use crate::inverse::unknowns::Unknowns;
 use crate::math::cholesky;
 use crate::math::rng::Stream;
 use glam::{DVec3, Vec3};
@@ -71,14 +73,19 @@ pub fn standard_errors(
     equations: &NormalEquations,
     scores: &SparseRows,
     free: &[usize],
-    objects: usize,
+    at: &Unknowns,
 ) -> StandardErrors {
-    let prior = PriorTerms::new(equations, free);
+    let objects = at.surfaces();
+    let prior = PriorTerms::new(equations, free, at);
     let variances = match &equations.coupling {
-        Coupling::Dense(hessian) => sandwich(hessian, &scores.gram(), &prior),
+        Coupling::Dense(_) => sandwich(equations, &scores.gram(), &prior),
         Coupling::Sparse(slopes) => {
-            let diagonal = &equations.diagonal;
-            bootstrap(SparseHessian { slopes, diagonal }, scores, &prior)
+            let hessian = SparseHessian {
+                slopes,
+                diagonal: &equations.diagonal,
+                prior: &prior,
+            };
+            bootstrap(hessian, scores)
         }
     };
     let mut errors = StandardErrors {
@@ -89,12 +96,10 @@ pub fn standard_errors(
         let diagonal = equations.diagonal[row];
         let inflation = (diagonal / equations.signal(row)).max(DVec3::ONE);
         let own = variance.max(DVec3::ZERO).powf(0.5);
-        let of_prior = DVec3::select(
-            prior.precision[row].cmpgt(DVec3::ZERO),
-            (prior.variance[row] / prior.precision[row]).powf(0.5),
-            DVec3::INFINITY,
-        );
-        let error = (own * inflation).min(of_prior).max(own).as_vec3();
+        let error = (own * inflation)
+            .min(prior.deviation[row])
+            .max(own)
+            .as_vec3();
         let target = match index.checked_sub(objects) {
             None => &mut errors.albedo[index],
             Some(emitter) => &mut errors.emission[emitter],
@@ -113,14 +118,15 @@ pub fn leave_one_out(
     clusters: &[Linearised],
     robust: &RobustWeights,
     free: &[usize],
+    at: &Unknowns,
 ) -> SparseRows {
-    let Coupling::Dense(hessian) = &equations.coupling else {
+    let Coupling::Dense(_) = &equations.coupling else {
         return SparseRows::scores(clusters, free.len(), robust, |_| DVec3::ONE);
     };
-    let prior = PriorTerms::new(equations, free);
+    let prior = PriorTerms::new(equations, free, at);
     let inverses: Vec<Option<DMatrix<f64>>> = (0..3)
         .into_par_iter()
-        .map(|c| inverse(&hessian[c], &prior.added, c))
+        .map(|c| inverse(equations, &prior, c))
         .collect();
     SparseRows::scores(clusters, free.len(), robust, |index| {
         let cluster = &clusters[index];
@@ -145,44 +151,21 @@ fn quadratic(matrix: &DMatrix<f64>, cluster: &Linearised, channel: usize) -> f64
     sum
 }
 
-/// The prior of the free parameters, in the units of the normal equations.
-struct PriorTerms {
-    precision: Vec<DVec3>,
-    /// Terms added to the diagonal: the precision, and one for parameters that no path meets.
-    added: Vec<DVec3>,
-    /// [`NormalEquations::prior_variance`] of each parameter.
-    variance: Vec<DVec3>,
-}
-
-impl PriorTerms {
-    fn new(equations: &NormalEquations, free: &[usize]) -> Self {
-        let variance: Vec<DVec3> = (0..free.len())
-            .map(|row| equations.prior_variance(row))
-            .collect();
-        let precision: Vec<DVec3> = (free.iter().zip(&variance))
-            .map(|(&i, &variance)| equations.prior.of(i, variance).1)
-            .collect();
-        let added = (precision.iter().zip(&equations.diagonal))
-            .map(|(p, d)| *p + DVec3::select(d.cmpgt(DVec3::ZERO), DVec3::ZERO, DVec3::ONE))
-            .collect();
-        Self {
-            precision,
-            added,
-            variance,
-        }
-    }
-}
-
-/// Inverse of one channel's Hessian plus `added` on the diagonal, over the first `added.len()` parameters; damped as far as
-/// needed to be positive definite, `None` if that fails.
-fn inverse(hessian: &DMatrix<f64>, added: &[DVec3], channel: usize) -> Option<DMatrix<f64>> {
-    let n = added.len();
+/// Inverse of one channel's Hessian plus the prior, over the prior's parameters, which are the first ones; damped as far as needed
+/// to be positive definite, `None` if that fails.
+fn inverse(
+    equations: &NormalEquations,
+    prior: &PriorTerms,
+    channel: usize,
+) -> Option<DMatrix<f64>> {
+    let n = prior.added.len();
+    let hessian = equations.with_couplings(prior, channel);
     let mut damping = 0.0;
     while damping < 1e6 {
         let matrix = DMatrix::from_fn(n, n, |a, b| {
             let h = hessian[(a.max(b), a.min(b))];
             h + if a == b {
-                added[a][channel] + damping * h
+                prior.added[a][channel] + damping * h
             } else {
                 0.0
             }
@@ -197,20 +180,25 @@ fn inverse(hessian: &DMatrix<f64>, added: &[DVec3], channel: usize) -> Option<DM
 
 /// Variances from dense matrices; −1 in channels without an inverse.
 fn sandwich(
-    hessian: &[DMatrix<f64>; 3],
+    equations: &NormalEquations,
     scatter: &[DMatrix<f64>; 3],
     prior: &PriorTerms,
 ) -> Vec<DVec3> {
     let n = prior.added.len();
     per_channel(|channel| {
-        let Some(bread) = inverse(&hessian[channel], &prior.added, channel) else {
+        let Some(bread) = inverse(equations, prior, channel) else {
             return vec![-1.0; n];
         };
         let scatter = &scatter[channel];
-        let meat = DMatrix::from_fn(n, n, |a, b| {
+        let mut meat = DMatrix::from_fn(n, n, |a, b| {
             let own = (prior.variance[a] * prior.precision[a])[channel];
             scatter[(a.max(b), a.min(b))] + if a == b { own } else { 0.0 }
         });
+        for (a, b, coupling) in prior.couplings(channel) {
+            let own = coupling * (prior.variance[a] * prior.variance[b])[channel].sqrt();
+            meat[(a, b)] += own;
+            meat[(b, a)] += own;
+        }
         // The diagonal of the product of all three; both matrices are symmetric.
         let product = meat * &bread;
         (0..n)
@@ -221,8 +209,10 @@ fn sandwich(
 
 /// The same variances by the multiplier bootstrap (Wu 1986): with random signs ε of the clusters, (H + P)⁻¹ Σ ε g has the
 /// covariance of the estimate.
-fn bootstrap(hessian: SparseHessian, scores: &SparseRows, prior: &PriorTerms) -> Vec<DVec3> {
+fn bootstrap(hessian: SparseHessian, scores: &SparseRows) -> Vec<DVec3> {
+    let prior = hessian.prior;
     let n = prior.added.len();
+    let roots = prior.roots();
     let (free, zero) = (vec![DVec3::ONE; n], vec![DVec3::ZERO; n]);
     let draws: Vec<Vec<DVec3>> = (0..DRAWS)
         .into_par_iter()
@@ -232,8 +222,9 @@ fn bootstrap(hessian: SparseHessian, scores: &SparseRows, prior: &PriorTerms) ->
                 DVec3::splat([-1.0, 1.0][bit])
             };
             let mut right = scores.weighted(|cluster| sign(0, cluster));
-            for (i, b) in right.iter_mut().enumerate() {
-                *b += (prior.variance[i] * prior.precision[i]).powf(0.5) * sign(1, i);
+            let signs: Vec<DVec3> = (0..n).map(|i| sign(1, i)).collect();
+            for (b, own) in right.iter_mut().zip(prior.scores(&roots, &signs)) {
+                *b += own;
             }
             hessian.solve(&prior.added, &free, &right, &zero, DRAW_TOLERANCE)
         })
@@ -250,8 +241,9 @@ pub fn score_tests(
     scores: &SparseRows,
     free: &[usize],
     active: usize,
+    at: &Unknowns,
 ) -> Vec<ScoreTest> {
-    let prior = PriorTerms::new(equations, &free[..active]);
+    let prior = PriorTerms::new(equations, &free[..active], at);
     let eliminated = match &equations.coupling {
         Coupling::Dense(hessian) => {
             eliminate_dense(equations, hessian, &scores.gram(), &prior, active)
@@ -287,7 +279,7 @@ fn eliminate_dense(
     // The curvatures of all tested parameters, then their variances.
     let values = per_channel(|channel| {
         let (hessian, scatter) = (&hessian[channel], &scatter[channel]);
-        let Some(inverse) = inverse(hessian, &prior.added, channel) else {
+        let Some(inverse) = inverse(equations, prior, channel) else {
             return vec![0.0; 2 * tested];
         };
         let active_scatter = DMatrix::from_fn(active, active, |a, b| scatter[(a.max(b), a.min(b))]);
@@ -322,7 +314,11 @@ fn eliminate_sparse(
 ) -> Vec<Eliminated> {
     let n = equations.diagonal.len();
     let diagonal = &equations.diagonal;
-    let hessian = SparseHessian { slopes, diagonal };
+    let hessian = SparseHessian {
+        slopes,
+        diagonal,
+        prior,
+    };
     let mut tests: Vec<Eliminated> = (active..n)
         .map(|row| (equations.diagonal[row], equations.scatter[row]))
         .collect();
@@ -380,12 +376,12 @@ mod tests {
                 })
                 .collect();
             let prior = Prior::new(1, 1, Vec3::ONE);
-            let (even, free) = (RobustWeights::even(1), [1]);
+            let (even, free, at) = (RobustWeights::even(1), [1], Unknowns::new(1));
             let equations = NormalEquations::new(&clusters, 1, &even, &prior);
             let scores = SparseRows::scores(&clusters, 1, &even, |_| DVec3::ONE);
-            let plain = standard_errors(&equations, &scores, &free, 1).emission[0].x;
-            let kept = leave_one_out(&equations, &clusters, &even, &free);
-            let error = standard_errors(&equations, &kept, &free, 1).emission[0].x;
+            let plain = standard_errors(&equations, &scores, &free, &at).emission[0].x;
+            let kept = leave_one_out(&equations, &clusters, &even, &free, &at);
+            let error = standard_errors(&equations, &kept, &free, &at).emission[0].x;
             let n = count as f32;
             assert!((plain - n.sqrt().recip()).abs() < 1e-4, "{plain}");
             assert!((error - n.sqrt() / (n - 1.0)).abs() < 1e-4, "{error}");
@@ -406,7 +402,7 @@ mod tests {
         let even = RobustWeights::even(1);
         let equations = NormalEquations::new(&clusters, 1, &even, &prior);
         let scores = SparseRows::scores(&clusters, 1, &even, |_| DVec3::ONE);
-        let error = standard_errors(&equations, &scores, &[0], 1).albedo[0].x;
+        let error = standard_errors(&equations, &scores, &[0], &Unknowns::new(1)).albedo[0].x;
         assert!((error - ALBEDO_DEVIATION).abs() < 1e-4, "{error}");
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::inverse::fit::equations::{Coupling, NormalEquations, per_channel};
 use crate::inverse::fit::prior::Prior;
+use crate::inverse::fit::prior_terms::PriorTerms;
 use crate::inverse::fit::robust_weights::RobustWeights;
 use crate::inverse::fit::sparse_step::SparseHessian;
 use crate::inverse::fit::step::Step;
@@ -10,7 +11,7 @@ use crate::inverse::paths::evaluate::Linearised;
 use crate::inverse::roles::places;
 use crate::inverse::unknowns::Unknowns;
 use glam::DVec3;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 /// Damping relative to the diagonal; only guards the factorisation against rounding.
 pub const MIN_DAMPING: f64 = 1e-10;
@@ -105,9 +106,10 @@ pub fn is_stalled(before: f64, after: f64) -> bool {
 /// point out of the bounds do not count. About one if only noise is left.
 pub fn relative_gradient(equations: &NormalEquations, free: &[usize], at: &Unknowns) -> f64 {
     let (mut total, mut expected) = (0.0, 0.0);
-    let gradients = gradients(equations, free, at).into_iter();
+    let prior = PriorTerms::new(equations, free, at);
+    let gradients = gradients(equations, &prior, free, at).into_iter();
     for (row, (gradient, &i)) in gradients.zip(free).enumerate() {
-        let (x, upper) = (at.value(i).as_dvec3(), upper(i, at));
+        let (x, upper) = (at.value(i).as_dvec3(), at.upper(i));
         let curvature = equations.diagonal[row];
         for channel in 0..3 {
             let [x, g, h] = [x, gradient, curvature].map(|v| v[channel]);
@@ -126,21 +128,17 @@ pub fn relative_gradient(equations: &NormalEquations, free: &[usize], at: &Unkno
 }
 
 /// The direction of descent of each free parameter, including the prior.
-fn gradients(equations: &NormalEquations, free: &[usize], at: &Unknowns) -> Vec<DVec3> {
-    let with_prior = |(row, &i): (usize, &usize)| {
-        let (mean, precision) = equations.prior_of(row, i);
-        equations.descent[row] + precision * (mean - at.value(i).as_dvec3())
-    };
-    free.iter().enumerate().map(with_prior).collect()
-}
-
-/// The upper bound of a parameter: 1 for albedos.
-fn upper(index: usize, unknowns: &Unknowns) -> f64 {
-    if index < unknowns.surfaces() {
-        1.0
-    } else {
-        f64::INFINITY
-    }
+fn gradients(
+    equations: &NormalEquations,
+    prior: &PriorTerms,
+    free: &[usize],
+    at: &Unknowns,
+) -> Vec<DVec3> {
+    let values: Vec<DVec3> = free.iter().map(|&i| at.value(i).as_dvec3()).collect();
+    let pulls = prior.pull(&values);
+    (equations.descent.iter().zip(pulls))
+        .map(|(g, pull)| *g + pull)
+        .collect()
 }
 
 /// The largest component of a step, in standard errors of the parameters.
@@ -161,23 +159,22 @@ pub fn propose(
     damping: f64,
 ) -> (Unknowns, StepLength) {
     let x: Vec<DVec3> = free.iter().map(|&i| from.value(i).as_dvec3()).collect();
-    let descent = gradients(equations, free, from);
-    // Parameters that no path meets keep their value.
+    let prior = PriorTerms::new(equations, free, from);
+    let descent = gradients(equations, &prior, free, from);
     let added = |damping: f64| -> Vec<DVec3> {
-        (free.iter().zip(&equations.diagonal).enumerate())
-            .map(|(row, (&i, diagonal))| {
-                let unmet = DVec3::select(diagonal.cmpgt(DVec3::ZERO), DVec3::ZERO, DVec3::ONE);
-                let precision = equations.prior_of(row, i).1;
-                *diagonal * damping + precision + unmet
-            })
+        (prior.added.iter().zip(&equations.diagonal))
+            .map(|(added, diagonal)| *diagonal * damping + *added)
             .collect()
     };
-    let upper: Vec<f64> = free.iter().map(|&i| upper(i, from)).collect();
+    let upper: Vec<f64> = free.iter().map(|&i| from.upper(i)).collect();
     let step = match &equations.coupling {
-        Coupling::Dense(hessian) => dense_step(hessian, &x, &descent, &upper, damping, &added),
+        Coupling::Dense(_) => dense_step(equations, &prior, &x, &descent, &upper, damping, &added),
         Coupling::Sparse(slopes) => {
-            let diagonal = &equations.diagonal;
-            let hessian = SparseHessian { slopes, diagonal };
+            let hessian = SparseHessian {
+                slopes,
+                diagonal: &equations.diagonal,
+                prior: &prior,
+            };
             hessian.bounded_step(&x, &descent, &added(damping), &upper)
         }
     };
@@ -204,7 +201,8 @@ pub fn propose(
 
 /// The step of each channel, damped as far as needed to be solvable; zero if no damping helps.
 fn dense_step(
-    hessian: &[DMatrix<f64>; 3],
+    equations: &NormalEquations,
+    prior: &PriorTerms,
     x: &[DVec3],
     descent: &[DVec3],
     upper: &[f64],
@@ -213,11 +211,12 @@ fn dense_step(
 ) -> Vec<DVec3> {
     per_channel(|channel| {
         let of = |all: &[DVec3]| -> Vec<f64> { all.iter().map(|v| v[channel]).collect() };
+        let hessian = equations.with_couplings(prior, channel);
         let (x, descent) = (of(x), DVector::from_vec(of(descent)));
         let mut damping = damping;
         while damping < 1e9 {
             let step = Step {
-                hessian: &hessian[channel],
+                hessian: &hessian,
                 descent: &descent,
                 damping: DVector::from_vec(of(&added(damping))),
                 upper,

@@ -1,9 +1,12 @@
 //! Priors of the unknowns: wide normal distributions that keep undetermined unknowns at plausible values.
 
+use crate::inverse::fit::sky_prior::SkyPrior;
 use crate::inverse::known::Known;
+use crate::inverse::sky::ExpectedSky;
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Standard deviation of an unknown albedo about [`ALBEDO_MEAN`].
 pub const ALBEDO_DEVIATION: f32 = 0.5;
@@ -19,9 +22,13 @@ const SCAN_DEVIATION: f32 = 1.0;
 /// The same for a scan's sun, whose light is up to a thousand times that of a room: it is determined by what it falls on.
 const SUN_DEVIATION: f32 = 1e3;
 
-/// Standard deviation of each channel of outside radiance about its expected colour, relative to its fitted brightness. Of 0.03,
-/// 0.1 and 0.3 it gives the least albedo error in `relit trade --rooms 12 --family window --preset preview`.
+/// Standard deviation of each channel of outside radiance about its expected colour, relative to its brightness. Of 0.1 and 0.2 it
+/// gives the smaller albedo error in `relit trade --rooms 12 --family window --preset preview`.
 const OUTSIDE_TINT: f32 = 0.1;
+/// The same over the relative deviation of the brightness, where a direction is far from measured ones. From the horizon of a clear
+/// sky to its zenith, colours change by a third of the brightness; part of that is extrapolated. With 0.5 the same command gives
+/// larger errors in its worst tenth.
+const DISTANT_TINT: f32 = 0.2;
 /// The same where nothing shows the colour: each channel may be off by as much as the whole.
 const UNKNOWN_TINT: f32 = 1.0;
 
@@ -66,6 +73,8 @@ pub struct Prior {
     /// Mean radiance of all photographs.
     photographed: Vec3,
     scanned: bool,
+    /// The joint distribution of the outside directions, where photographs show some of them.
+    sky: Option<Arc<SkyPrior>>,
     known: BTreeMap<usize, Vec3>,
 }
 
@@ -80,6 +89,7 @@ impl Prior {
             tints: vec![OUTSIDE_TINT; surfaces - outside],
             photographed,
             scanned: false,
+            sky: None,
             known: BTreeMap::new(),
         }
     }
@@ -113,19 +123,24 @@ impl Prior {
         self
     }
 
-    /// The prior with the given means of the outside directions, by surface, and whether their colours are known. A direction may
-    /// be off by as much as its mean, and in a modelled room by as much as the brightest of them: one sky shines through all
-    /// windows.
-    pub fn with_sky(mut self, expected: impl Fn(u32) -> (Vec3, bool)) -> Self {
+    /// The joint distribution of the outside directions, and the index of the first one's emission among all parameters.
+    pub fn sky(&self) -> Option<(&SkyPrior, usize)> {
+        let sky = self.sky.as_deref()?;
+        Some((sky, self.surfaces + self.outside))
+    }
+
+    /// The prior with what is expected of outside directions: their joint distribution, where that is known. Otherwise, and for light that no photograph shows by itself, as behind saturated pixels, a direction may be off by as much as
+    /// its mean, and in a modelled room by as much as the brightest of them: one sky shines through all windows.
+    pub fn with_sky(mut self, sky: Option<&ExpectedSky>) -> Self {
         let mut brightest = Vec3::ZERO;
         let directions = self.directions.iter_mut().zip(&mut self.tints);
-        for (surface, ((mean, deviation), tint)) in (self.outside as u32..).zip(directions) {
-            let has_color;
-            (*mean, has_color) = expected(surface);
-            *tint = if has_color {
-                OUTSIDE_TINT
-            } else {
-                UNKNOWN_TINT
+        for (d, ((mean, deviation), tint)) in directions.enumerate() {
+            *mean = sky
+                .and_then(|sky| sky.radiance.get(d).copied())
+                .unwrap_or_default();
+            *tint = match sky.and_then(|sky| sky.has_color.get(d)) {
+                Some(true) => OUTSIDE_TINT,
+                _ => UNKNOWN_TINT,
             };
             *deviation = deviation.max(*mean);
             brightest = brightest.max(*deviation);
@@ -135,10 +150,23 @@ impl Prior {
                 *deviation = brightest;
             }
         }
+        self.sky = sky.and_then(|sky| {
+            let covariance = sky.covariance.clone()?;
+            let tint = |d: usize| {
+                let variance = covariance[(d, d)].max(0.0) as f32;
+                // The mean square of the brightness is one and its variance.
+                OUTSIDE_TINT.hypot(DISTANT_TINT * variance.sqrt()) * (1.0 + variance).sqrt()
+            };
+            Some(Arc::new(SkyPrior {
+                radiance: sky.radiance.clone(),
+                tint: (0..sky.radiance.len()).map(tint).collect(),
+                covariance,
+            }))
+        });
         self
     }
 
-    /// The prior with each outside direction held near its expected colour, at its fitted brightness.
+    /// The prior with outside light held near its expected colour, at its fitted brightness.
     ///
     /// The effect of a direction on the room may determine little more than its brightness, and channels fitted independently
     /// would give colours from noise. `found` gives the fitted radiance and its standard error by surface; `color` gives the
@@ -228,6 +256,16 @@ mod tests {
         assert_eq!(nothing, (DVec3::splat(0.5), DVec3::splat(4.0)));
     }
 
+    /// A sky of these radiances.
+    fn sky(radiance: &[f32]) -> ExpectedSky {
+        ExpectedSky {
+            radiance: radiance.iter().copied().map(Vec3::splat).collect(),
+            covariance: None,
+            has_color: vec![true; radiance.len()],
+            shape: Vec::new(),
+        }
+    }
+
     #[test]
     fn light_found_outside_is_held_near_the_colour_expected_of_it() {
         let color = Vec3::new(1.0, 2.0, 4.0);
@@ -256,7 +294,7 @@ mod tests {
         }
         // Light of unknown colour may be any.
         let unknown = Prior::new(2, 1, Vec3::splat(0.1))
-            .with_sky(|_| (Vec3::ONE, false))
+            .with_sky(None)
             .with_outside_found(|_| found, |_, _| Some(color));
         let (mean, precision) = unknown.of(3, DVec3::ONE);
         assert!((precision * mean * mean - DVec3::ONE).length() < 1e-4);
@@ -266,7 +304,7 @@ mod tests {
     fn lamps_are_free_and_the_outside_is_held_near_what_was_seen_in_any_unit() {
         for unit in [1e-12f32, 1.0, 1e12] {
             let prior = Prior::new(5, 3, Vec3::splat(2.0 * unit))
-                .with_sky(|_| (Vec3::splat(3.0 * unit), true));
+                .with_sky(Some(&sky(&[3.0 * unit, 3.0 * unit])));
             let noise = DVec3::splat(0.1);
             assert_eq!(prior.of(0, noise), (DVec3::splat(0.5), noise / 0.25));
             assert_eq!(prior.of(5 + 2, noise), (DVec3::ZERO, DVec3::ZERO));
@@ -277,8 +315,7 @@ mod tests {
         }
         // In a scan each direction is held to its own mean, and no tighter than to the photographs; the sun is as good as free.
         let scan = Prior::new(6, 3, Vec3::splat(2.0)).of_scan();
-        let scan =
-            scan.with_sky(|surface| (Vec3::splat([0.5, 5.0, 0.0][surface as usize - 3]), true));
+        let scan = scan.with_sky(Some(&sky(&[0.5, 5.0])));
         for (surface, deviation) in [(3, 2.0f64), (4, 5.0), (5, 2000.0)] {
             let (_, precision) = scan.of(6 + surface, DVec3::ONE);
             assert!((precision * deviation.powi(2) - DVec3::ONE).length() < 1e-6);

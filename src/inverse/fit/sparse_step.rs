@@ -1,6 +1,7 @@
 //! Steps of the fit with a Hessian of sparse rows, for too many unknowns for dense matrices: the paths of a cluster meet few of the
 //! surfaces. Solved by conjugate gradients, for the three channels in parallel.
 
+use crate::inverse::fit::prior_terms::PriorTerms;
 use crate::inverse::fit::sparse_rows::SparseRows;
 use glam::DVec3;
 
@@ -12,15 +13,24 @@ const TOLERANCE: f64 = 3e-6;
 const MAX_ACTIVE_SETS: usize = 24;
 
 /// The Hessian H as sparse rows.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub struct SparseHessian<'a> {
     /// [`SparseRows::slopes`].
     pub slopes: &'a SparseRows,
     /// Its diagonal.
     pub diagonal: &'a [DVec3],
+    /// The prior, whose off-diagonal terms are added.
+    pub prior: &'a PriorTerms,
 }
 
 impl SparseHessian<'_> {
+    /// H v with the off-diagonal terms of the prior.
+    fn times(&self, v: &[DVec3]) -> Vec<DVec3> {
+        let mut product = self.slopes.gram_times(v);
+        self.prior.add_coupled(v, &mut product);
+        product
+    }
+
     /// Solves (H + D) x = b by preconditioned conjugate gradients from `start`, with D = `added` and b = `right`, over the entries
     /// where `free` is one; the others are zero.
     pub fn solve(
@@ -44,7 +54,7 @@ impl SparseHessian<'_> {
         };
         let goal = dot(&residual, &scaled(&residual)) * (tolerance * tolerance);
         if x.iter().any(|x| *x != DVec3::ZERO) {
-            let product = self.slopes.gram_times(&x);
+            let product = self.times(&x);
             for i in 0..n {
                 residual[i] -= (product[i] + added[i] * x[i]) * free[i];
             }
@@ -56,7 +66,7 @@ impl SparseHessian<'_> {
             if !rz.cmpgt(goal).any() {
                 break;
             }
-            let mut product = self.slopes.gram_times(&direction);
+            let mut product = self.times(&direction);
             for i in 0..n {
                 product[i] = (product[i] + added[i] * direction[i]) * free[i];
             }
@@ -92,13 +102,13 @@ impl SparseHessian<'_> {
         let mut step = held.clone();
         for _ in 0..MAX_ACTIVE_SETS {
             // Solve for the free parameters, with the others at their bounds.
-            let from_held = self.slopes.gram_times(&held);
+            let from_held = self.times(&held);
             let right: Vec<DVec3> = (0..n).map(|i| descent[i] - from_held[i]).collect();
             step = self.solve(added, &free, &right, &step, TOLERANCE);
             for i in 0..n {
                 step[i] += held[i];
             }
-            let product = self.slopes.gram_times(&step);
+            let product = self.times(&step);
 
             // Hold parameters that left their bounds, and free those whose gradient points inwards.
             let mut changed = false;
@@ -136,9 +146,11 @@ mod tests {
     use crate::inverse::fit::prior::Prior;
     use crate::inverse::fit::robust_weights::RobustWeights;
     use crate::inverse::paths::evaluate::Linearised;
+    use crate::inverse::sky::ExpectedSky;
     use crate::inverse::unknowns::Unknowns;
     use crate::math::rng::Stream;
     use glam::Vec3;
+    use nalgebra::{DMatrix, DVector};
 
     const SURFACES: usize = 40;
     /// All albedos and the first ten emissions.
@@ -203,7 +215,8 @@ mod tests {
     fn drawn_standard_errors_are_those_of_matrices() {
         let free: Vec<usize> = (0..FREE).collect();
         let (equations, scores) = both();
-        let [dense, sparse] = equations.map(|e| standard_errors(&e, &scores, &free, SURFACES));
+        let [dense, sparse] =
+            equations.map(|e| standard_errors(&e, &scores, &free, &Unknowns::new(SURFACES)));
         let ratios: Vec<f64> = (dense.albedo.iter().zip(&sparse.albedo))
             .flat_map(|(a, b)| (*b / *a).to_array())
             .map(f64::from)
@@ -216,15 +229,98 @@ mod tests {
 
     #[test]
     fn what_is_released_is_tested_alike() {
-        let free: Vec<usize> = (0..FREE).collect();
+        let (free, at): (Vec<usize>, _) = ((0..FREE).collect(), Unknowns::new(SURFACES));
         let (equations, scores) = both();
-        let [dense, sparse] = equations.map(|e| score_tests(&e, &scores, &free, SURFACES));
+        let [dense, sparse] = equations.map(|e| score_tests(&e, &scores, &free, SURFACES, &at));
         for (a, b) in dense.iter().zip(&sparse) {
             for c in 0..3 {
                 for ratio in [a.step[c] / b.step[c], a.stderr[c] / b.stderr[c]] {
                     assert!((ratio - 1.0).abs() < 0.05, "{a:?} {b:?}");
                 }
             }
+        }
+    }
+
+    /// Two correlated directions beside the other parameters: the sparse rows solve the same system as its matrix.
+    #[test]
+    fn a_correlated_prior_is_solved_as_with_matrices() {
+        const SEEN: usize = SURFACES - 2;
+        let expected = ExpectedSky {
+            radiance: vec![Vec3::new(1.0, 2.0, 3.0), Vec3::ONE],
+            covariance: Some(DMatrix::from_row_slice(2, 2, &[0.5, 0.4, 0.4, 0.6])),
+            has_color: vec![true; 2],
+            shape: Vec::new(),
+        };
+        let prior = Prior::new(SURFACES, SEEN, Vec3::ONE).with_sky(Some(&expected));
+        let free: Vec<usize> = (0..FREE - 2)
+            .chain([SURFACES + SEEN, SURFACES + SEEN + 1])
+            .collect();
+        let (clusters, even) = (clusters(), RobustWeights::even(SURFACES));
+        let at = Unknowns::new(SURFACES);
+        let dense = NormalEquations::new(&clusters, FREE, &even, &prior);
+        let terms = PriorTerms::new(&dense, &free, &at);
+        assert!(terms.couplings(1).all(|(_, _, value)| value < 0.0) && terms.block.is_some());
+        let slopes = SparseRows::slopes(&clusters, FREE, &even);
+        let hessian = SparseHessian {
+            slopes: &slopes,
+            diagonal: &dense.diagonal,
+            prior: &terms,
+        };
+        let values: Vec<DVec3> = free.iter().map(|&i| at.value(i).as_dvec3()).collect();
+        let (right, one) = (terms.pull(&values), vec![DVec3::ONE; FREE]);
+        let found = hessian.solve(&terms.added, &one, &right, &vec![DVec3::ZERO; FREE], 1e-9);
+        for c in 0..3 {
+            let mut matrix = dense.with_couplings(&terms, c).into_owned();
+            matrix.fill_upper_triangle_with_lower_triangle();
+            for (row, added) in terms.added.iter().enumerate() {
+                matrix[(row, row)] += added[c];
+            }
+            let right = DVector::from_iterator(FREE, right.iter().map(|v| v[c]));
+            let solution = matrix.cholesky().expect("definite").solve(&right);
+            for (a, b) in found.iter().zip(solution.iter()) {
+                assert!((a[c] - b).abs() < 1e-4 * solution.amax(), "{} {b}", a[c]);
+            }
+        }
+    }
+
+    /// The pull of a correlated prior is minus half the derivative of its squared distance, by finite differences.
+    #[test]
+    fn a_correlated_prior_pulls_downhill() {
+        let expected = ExpectedSky {
+            radiance: vec![Vec3::ONE; 2],
+            covariance: Some(DMatrix::from_row_slice(2, 2, &[0.5, 0.4, 0.4, 0.6])),
+            has_color: vec![true; 2],
+            shape: Vec::new(),
+        };
+        let prior = Prior::new(SURFACES, SURFACES - 2, Vec3::ONE).with_sky(Some(&expected));
+        let free: Vec<usize> = (2 * SURFACES - 2 - (FREE - 2)..2 * SURFACES).collect();
+        let at = Unknowns::new(SURFACES);
+        let even = RobustWeights::even(SURFACES);
+        let equations = NormalEquations::new(&clusters(), FREE, &even, &prior);
+        let terms = PriorTerms::new(&equations, &free, &at);
+        let distance = |x: &[DVec3]| -> DVec3 {
+            let pull = terms.pull(x);
+            (pull.iter().zip(x).zip(&terms.mean))
+                .map(|((p, x), m)| *p * (*m - *x))
+                .sum()
+        };
+        let x: Vec<DVec3> = (0..FREE)
+            .map(|i| DVec3::splat(0.1 * (i % 7) as f64))
+            .collect();
+        let pull = terms.pull(&x);
+        for row in FREE - 4..FREE {
+            let moved = |step: f64| {
+                let mut x = x.clone();
+                x[row] += step;
+                distance(&x)
+            };
+            let slope = (moved(1e-4) - moved(-1e-4)) / -4e-4;
+            let size = pull[row].abs().max_element().max(1e-3);
+            assert!(
+                (slope - pull[row]).abs().max_element() < 1e-5 * size,
+                "{slope} {}",
+                pull[row]
+            );
         }
     }
 }

@@ -26,6 +26,11 @@ pub struct OutsideGrid {
 }
 
 impl OutsideGrid {
+    /// Columns and rows.
+    pub fn size(&self) -> [usize; 2] {
+        [self.width, self.height]
+    }
+
     /// Number of surfaces.
     pub fn surfaces(&self) -> usize {
         self.width * self.height + 3

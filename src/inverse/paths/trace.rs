@@ -146,7 +146,7 @@ impl Tracer<'_> {
     ) -> u64 {
         let mut rays = 1;
         let Some(mut hit) = self.scene.intersect(camera_ray) else {
-            vertices.extend(self.outside.map(|grid| grid.vertex(camera_ray, 1.0)));
+            vertices.extend(self.unmeasured(camera_ray, 1.0));
             return rays;
         };
         let mut wo = -camera_ray.direction;
@@ -235,7 +235,7 @@ impl Tracer<'_> {
                 } else {
                     vertices.push(vertex);
                     // No light samples are drawn from unmeasured outside light, so a hit has the whole MIS weight.
-                    vertices.extend(self.outside.map(|grid| grid.vertex(&ray, scale)));
+                    vertices.extend(self.unmeasured(&ray, scale));
                 }
                 return rays;
             };
@@ -262,6 +262,12 @@ impl Tracer<'_> {
             wo = -wi;
             bounce += 1;
         }
+    }
+
+    /// The last vertex of a path that leaves the mesh where outside light is not measured.
+    fn unmeasured(&self, ray: &Ray, scale: f32) -> Option<Vertex> {
+        let shape = (self.sky).map_or(1.0, |sky| sky.shape(ray.origin, ray.direction));
+        self.outside.map(|grid| grid.vertex(ray, scale * shape))
     }
 
     /// Adds a light sample on an emitter to a vertex; returns the number of rays.

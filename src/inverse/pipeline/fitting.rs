@@ -66,7 +66,7 @@ impl Pipeline<'_, '_> {
         let (n, robust) = (free.len(), &self.robust);
         let equations = NormalEquations::new(&clusters, n, robust, &self.prior);
         let scores = SparseRows::scores(&clusters, n, robust, |_| DVec3::ONE);
-        score_tests(&equations, &scores, free, active)
+        score_tests(&equations, &scores, free, active, &self.unknowns)
     }
 
     /// Sets the robust weights and the model error from the residuals of the last fit, and fits again.
@@ -84,7 +84,7 @@ impl Pipeline<'_, '_> {
     pub(super) fn take(&mut self, fitted: &Fit) {
         let free = self.free();
         let scores = SparseRows::scores(&fitted.clusters, free.len(), &self.robust, |_| DVec3::ONE);
-        let errors = standard_errors(&fitted.equations, &scores, &free, self.roles.len());
+        let errors = standard_errors(&fitted.equations, &scores, &free, &fitted.unknowns);
         self.merge_errors(errors);
         self.take_values(fitted);
     }

@@ -63,14 +63,7 @@ impl Pipeline<'_, '_> {
     /// Sets the prior of unmeasured outside directions from the measured ones.
     pub(super) fn expect_of_outside(&mut self) {
         if let Some(sky) = &self.sky {
-            let grid = self.outside;
-            let band = std::f64::consts::PI / grid.height as f64;
-            let expected = |surface| match grid.direction(surface) {
-                // Saturated pixels show a light's brightness at least, and nothing of its colour.
-                None => (Vec3::ZERO, false),
-                Some(direction) => sky.expected(direction, band),
-            };
-            self.prior = self.prior.clone().with_sky(expected);
+            self.prior = self.prior.clone().with_sky(sky.expected());
         }
     }
 
@@ -161,8 +154,13 @@ impl Pipeline<'_, '_> {
         Ok(format!("comes from {from}{}", self.sun_in_words()))
     }
 
-    fn measured_outside(&self, surroundings: Surroundings) -> Option<MeasuredOutside> {
-        MeasuredOutside::new(self.problem, &self.gbuffer, surroundings)
+    pub(super) fn measured_outside(&self, surroundings: Surroundings) -> Option<MeasuredOutside> {
+        MeasuredOutside::new(
+            self.problem,
+            &self.gbuffer,
+            surroundings,
+            self.outside.size(),
+        )
     }
 
     /// Searches for a sun after a fit of outside light without one, and fits with the best candidate. Returns the fit with the sun
@@ -331,10 +329,13 @@ impl Pipeline<'_, '_> {
         let photographed = mean_radiance(&self.clusters);
         let bound = self.sky.as_ref().map(|sky| sky.mean_bound());
         let grid = self.outside;
+        let is_joint = self.prior.sky().is_some();
         let color = |surface: u32, expected: Vec3| match bound {
             // Sunlight falls on what it lights directly, so that each of its channels is determined.
             _ if surface == grid.sun_surface() => None,
             Some(bound) if grid.is_excess(surface) => Some(bound),
+            // Its channels have one brightness already.
+            Some(_) if is_joint => None,
             Some(_) => Some(expected),
             None => Some(photographed),
         };

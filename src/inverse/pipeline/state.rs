@@ -2,7 +2,6 @@
 
 use crate::inverse::fit::errors::StandardErrors;
 use crate::inverse::fit::prior::ExpectedAlbedo;
-use crate::inverse::outside::MeasuredOutside;
 use crate::inverse::pipeline::Pipeline;
 use crate::inverse::roles::Role;
 use crate::inverse::unknowns::Unknowns;
@@ -88,7 +87,8 @@ impl Pipeline<'_, '_> {
         self.outside.surroundings = state.surroundings;
         self.outside.sun = state.sun;
         if state.open {
-            self.sky = MeasuredOutside::new(self.problem, &self.gbuffer, state.surroundings);
+            self.sky = self.measured_outside(state.surroundings);
+            self.expect_of_outside();
         }
         if let Some(expected) = state.expected {
             self.prior.albedo = expected;

@@ -9,6 +9,7 @@ mod patterned;
 mod phone;
 mod photographed;
 mod scanned;
+mod sky;
 mod sparse;
 mod unseen;
 mod white;

@@ -1,6 +1,7 @@
 //! Rooms lit by sky and sun through openings in their walls.
 
 use crate::room::generated::furnisher::{Furnisher, walls};
+use crate::room::generated::sky::{KINDS, Sky};
 use crate::room::shape::Modeller;
 use crate::transport::environment::{Environment, direction_of};
 use crate::transport::sun::Sun;
@@ -45,8 +46,7 @@ pub fn shell(f: &mut Furnisher) -> Vec<Opening> {
         }
     });
     let level = f.scaled(0.3, 30.0);
-    let outside = sky(f, level, &openings[0]);
-    f.outside = outside.map(Arc::new);
+    f.outside = outside(f, level, &openings[0]).map(Arc::new);
     if f.between(0.0, 1.0) < 0.4 {
         f.lamp(0, level * 0.5);
     }
@@ -128,33 +128,57 @@ fn reveal(m: &mut Modeller, opening: &Opening, sides: [DVec3; 3]) {
     m.grid(corner + u, v, out, 2, 1);
 }
 
-/// A sky of about a radiance, brighter at the horizon, over dark ground; in three of five rooms with a sun shining into an opening.
-fn sky(f: &mut Furnisher, level: f64, opening: &Opening) -> Option<Environment> {
+/// One of the standard skies of about a radiance, bluer where it is darker, over dark ground; in three of five rooms with a sun
+/// shining into an opening.
+fn outside(f: &mut Furnisher, level: f64, opening: &Opening) -> Option<Environment> {
     let tint = f.color(1.0, 0.4);
     let ground = f.color(1.0, 0.5) * f.between(0.1, 0.4) as f32;
-    let horizon = f.between(0.0, 1.0) as f32;
+    let shines = f.between(0.0, 1.0) < 0.6;
+    let [_, u, v] = walls(f.size)[opening.wall];
+    let out = -u.cross(v).normalize_or_zero();
+    // A sun that does not shine in stands behind the room.
+    let azimuth = out.z.atan2(out.x) + f.between(-1.1, 1.1) + if shines { 0.0 } else { PI };
+    let elevation = f.between(0.15, 1.0);
+    let (sin, cos) = elevation.sin_cos();
+    let towards = DVec3::new(cos * azimuth.cos(), sin, cos * azimuth.sin()).as_vec3();
+    let sky = Sky {
+        kind: f.count(0, KINDS - 1),
+        sun: towards,
+    };
+    // Luminance to the power of one plus this in red, and minus this in blue.
+    let blueness = f.between(0.0, 0.3) as f32;
+    // The sun's irradiance relative to that of a uniform sky.
+    let strength = f.scaled(0.3, 6.0);
+    let warmth = f.color(1.0, 0.3);
+
     let [width, height] = MAP;
-    let pixels: Vec<Vec3> = (0..width * height)
-        .map(|pixel| {
-            let up = direction_of(width, height, pixel).y;
-            let light = match up > 0.0 {
-                true => tint * (1.0 + horizon * (1.0 - up)),
-                false => ground,
+    let directions: Vec<Vec3> = (0..width * height)
+        .map(|pixel| direction_of(width, height, pixel))
+        .collect();
+    let is_sky = |direction: &&Vec3| direction.y > 0.0;
+    let weighed = |d: &Vec3| sky.luminance(*d) * (1.0 - d.y * d.y).sqrt();
+    let sum: f32 = directions.iter().filter(is_sky).map(weighed).sum();
+    let solid_angle = |d: &Vec3| (1.0 - d.y * d.y).sqrt();
+    let mean = sum
+        / directions
+            .iter()
+            .filter(is_sky)
+            .map(solid_angle)
+            .sum::<f32>();
+    let pixels = (directions.iter())
+        .map(|direction| {
+            let light = if direction.y > 0.0 {
+                let relative = sky.luminance(*direction) / mean;
+                let red = relative.powf(blueness);
+                tint * relative * Vec3::new(red, 1.0, red.recip())
+            } else {
+                ground
             };
             light * level as f32
         })
         .collect();
-    let shines = f.between(0.0, 1.0) < 0.6;
-    let [_, u, v] = walls(f.size)[opening.wall];
-    let out = -u.cross(v).normalize_or_zero();
-    let azimuth = out.z.atan2(out.x) + f.between(-1.1, 1.1);
-    let elevation = f.between(0.15, 1.0);
-    // The sun's irradiance relative to that of a uniform sky.
-    let strength = f.scaled(0.3, 6.0);
-    let warmth = f.color(1.0, 0.3);
-    let (sin, cos) = elevation.sin_cos();
     let sun = shines.then(|| Sun {
-        direction: DVec3::new(cos * azimuth.cos(), sin, cos * azimuth.sin()).as_vec3(),
+        direction: towards,
         irradiance: warmth * (strength * PI * level) as f32,
     });
     Environment::new(width, height, pixels)?.with_sun(sun, None)
