@@ -110,7 +110,7 @@ impl MeasuredOutside {
             sun: sun.try_normalize(),
             expected: None,
         };
-        outside.expected = outside.expect(level_up(&scene.cameras, scene.up), grid);
+        outside.expected = Some(outside.expect(level_up(&scene.cameras, scene.up), grid));
         Some(outside)
     }
 
@@ -181,7 +181,7 @@ impl MeasuredOutside {
         &self.map
     }
 
-    /// What is expected of the unmeasured light; `None` if all that is measured is black.
+    /// What is expected of the unmeasured light.
     pub fn expected(&self) -> Option<&ExpectedSky> {
         self.expected.as_ref()
     }
@@ -197,19 +197,19 @@ impl MeasuredOutside {
         shape.get(cell).copied().unwrap_or(1.0)
     }
 
-    /// What is expected of the unmeasured light: from its directions by a regression; beside saturated pixels, what is measured at
-    /// the same elevation, since how much these hide is not known.
-    fn expect(&self, up: Vec3, grid: [usize; 2]) -> Option<ExpectedSky> {
-        if self.known_cells().any(|(.., is_bound)| is_bound) {
-            let band = PI / grid[1] as f64;
-            return Some(ExpectedSky::even(grid, |d| self.mean_at(d, band)));
-        }
+    /// What is expected of the unmeasured light: from its directions by a regression. Beside saturated pixels, as how much these hide
+    /// is not known, and where no sky is seen, what is measured at the same elevation.
+    fn expect(&self, up: Vec3, grid: [usize; 2]) -> ExpectedSky {
         let map = Map {
             size: self.map.size(),
             known: &|cell, direction| self.half(direction).known[cell],
             grid,
         };
-        ExpectedSky::new(&self.measured(), up, &map)
+        let is_saturated = self.known_cells().any(|(.., is_bound)| is_bound);
+        let sky = (!is_saturated).then(|| ExpectedSky::new(&self.measured(), up, &map));
+        let band = PI / grid[1] as f64;
+        let even = || ExpectedSky::even(grid, |direction| self.mean_at(direction, band));
+        sky.flatten().unwrap_or_else(even)
     }
 
     /// The mean over measured directions within ± `band` / 2 radians of a direction's elevation, or over all measured directions.

@@ -29,6 +29,10 @@ const GRAIN: f64 = 0.1;
 /// Least measured radiance, as a fraction of the mean: what is darker is as good as black.
 const MIN_RADIANCE: f64 = 1e-3;
 
+/// Greatest mean square of the measured logarithms in standard deviations, which is one for a sky. What is above is none: lamps and
+/// walls that the mesh lacks.
+const MAX_SQUARE: f64 = 2.0;
+
 /// Light that photographs show in a unit direction.
 #[derive(Debug, Clone, Copy)]
 pub struct Seen {
@@ -76,7 +80,7 @@ impl ExpectedSky {
         }
     }
 
-    /// Expects of the unmeasured cells of a map what goes with `measured` light; `None` if all of that is black.
+    /// Expects of the unmeasured cells of a map what goes with `measured` light; `None` if that is black or no sky's.
     pub fn new(measured: &[Seen], up: Vec3, map: &Map) -> Option<Self> {
         let sky = Regression::new(measured, up)?;
         let ([width, height], grid) = (map.size, map.grid);
@@ -129,7 +133,7 @@ struct Regression {
 }
 
 impl Regression {
-    /// The regression on measured light; `None` without any.
+    /// The regression on measured light; `None` without any, and if that is no sky's.
     fn new(measured: &[Seen], up: Vec3) -> Option<Self> {
         let n = measured.len();
         let sum: DVec3 = measured.iter().map(|seen| seen.radiance.as_dvec3()).sum();
@@ -150,6 +154,10 @@ impl Regression {
         let factor = cholesky::factor(own)?;
         let channel = |c: usize| DVector::from_fn(n, |i, _| (logs[i] - level)[c]);
         let weights = [0, 1, 2].map(|c| factor.solve(&channel(c)));
+        let square: f64 = (0..3).map(|c| channel(c).dot(&weights[c])).sum();
+        if square > MAX_SQUARE * 3.0 * n as f64 {
+            return None;
+        }
         Some(Self {
             up,
             directions: measured.iter().map(|seen| seen.direction).collect(),
@@ -286,6 +294,10 @@ mod tests {
         }
         assert!(Regression::new(&[], Vec3::Y).is_none());
         assert!(Regression::new(&[seen(Vec3::X, 0.0)], Vec3::Y).is_none());
+        // Lamps below a ceiling are no sky.
+        let lamps = spiral(0.9).enumerate();
+        let lamps = lamps.map(|(i, d)| seen(d, if i % 5 == 0 { 50.0 } else { 1.0 }));
+        assert!(Regression::new(&lamps.collect::<Vec<_>>(), Vec3::Y).is_none());
     }
 
     /// A map of which the lower half of the sky is measured: the shape is relative to the mean of the unmeasured cells.
