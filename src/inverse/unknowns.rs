@@ -42,6 +42,13 @@ impl Unknowns {
         }
     }
 
+    /// Whether a channel of a parameter is at a bound and the direction of descent points out of it.
+    pub fn is_held(&self, parameter: usize, channel: usize, descent: f64) -> bool {
+        let value = f64::from(self.value(parameter)[channel]);
+        let upper = self.upper(parameter);
+        (value <= 0.0 && descent < 0.0) || (value >= upper && descent > 0.0)
+    }
+
     /// Mutable access to the value of a parameter.
     pub fn value_mut(&mut self, parameter: usize) -> &mut Vec3 {
         match parameter.checked_sub(self.surfaces()) {

@@ -9,6 +9,7 @@ use relit::inverse::fit::equations::MIN_SIGNAL;
 use relit::inverse::fit::errors::standard_errors;
 use relit::inverse::fit::gauss_newton::fit;
 use relit::inverse::fit::prior::Prior;
+use relit::inverse::fit::prior_terms::PriorTerms;
 use relit::inverse::fit::robust_weights::RobustWeights;
 use relit::inverse::fit::sparse_rows::SparseRows;
 use relit::inverse::paths::clusters::{Cluster, cluster, mean_radiance};
@@ -185,7 +186,8 @@ fn the_fit_agrees_with_its_twin_in_f64() {
         found = again(&found.unknowns);
     }
     let scores = SparseRows::scores(&found.clusters, free.len(), &robust, |_| DVec3::ONE);
-    let errors = standard_errors(&found.equations, &scores, &free, &found.unknowns);
+    let terms = PriorTerms::new(&found.equations, &free, &found.unknowns);
+    let errors = standard_errors(&found.equations, &terms, &scores, &free, SURFACES);
     let mut worst = 0.0f64;
     for channel in 0..3 {
         let twin = fit_in_f64(&cache, &free, &prior, &found.unknowns, channel);

@@ -4,14 +4,12 @@
 //! darkness. Products are therefore taken across the two independent sets A and B.
 
 use crate::inverse::fit::prior::Prior;
-use crate::inverse::fit::prior_terms::PriorTerms;
 use crate::inverse::fit::robust_weights::RobustWeights;
 use crate::inverse::fit::sparse_rows::SparseRows;
 use crate::inverse::paths::evaluate::Linearised;
 use glam::DVec3;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
-use std::borrow::Cow;
 
 /// Greatest number of parameters for which dense matrices are stored, 8 MB a channel. `relit trade --rooms 3 --family clutter
 /// --preset preview` takes 3.1 s a room in the median, and 4.0 s with a limit of 256. More was not tried.
@@ -108,18 +106,6 @@ impl NormalEquations {
         let mean = (self.objective / self.clusters.max(1) as f64).max(DVec3::splat(1e-12));
         let met = self.diagonal[row].cmpgt(DVec3::ZERO);
         mean + DVec3::select(met, self.path_scatter[row] / self.signal(row), DVec3::ZERO)
-    }
-
-    /// The Hessian of one channel with the off-diagonal terms of the prior; empty with sparse rows. Only the lower triangle is set.
-    pub fn with_couplings(&self, prior: &PriorTerms, channel: usize) -> Cow<'_, DMatrix<f64>> {
-        let Coupling::Dense(hessian) = &self.coupling else {
-            return Cow::Owned(DMatrix::zeros(0, 0));
-        };
-        let mut hessian = Cow::Borrowed(&hessian[channel]);
-        for (row, column, value) in prior.couplings(channel) {
-            hessian.to_mut()[(row, column)] += value;
-        }
-        hessian
     }
 
     /// Root mean square of the residuals relative to the pixels' levels, over pixels and channels, without path noise.

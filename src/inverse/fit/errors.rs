@@ -7,7 +7,6 @@ use crate::inverse::fit::robust_weights::RobustWeights;
 use crate::inverse::fit::sparse_rows::SparseRows;
 use crate::inverse::fit::sparse_step::SparseHessian;
 use crate::inverse::paths::evaluate::Linearised;
-use crate::inverse::unknowns::Unknowns;
 use crate::math::cholesky;
 use crate::math::rng::Stream;
 use glam::{DVec3, Vec3};
@@ -71,19 +70,18 @@ impl ScoreTest {
 /// `scores` are the clusters' [`SparseRows::scores`], or those of [`leave_one_out`].
 pub fn standard_errors(
     equations: &NormalEquations,
+    prior: &PriorTerms,
     scores: &SparseRows,
     free: &[usize],
-    at: &Unknowns,
+    objects: usize,
 ) -> StandardErrors {
-    let objects = at.surfaces();
-    let prior = PriorTerms::new(equations, free, at);
     let variances = match &equations.coupling {
-        Coupling::Dense(_) => sandwich(equations, &scores.gram(), &prior),
+        Coupling::Dense(hessian) => sandwich(hessian, &scores.gram(), prior),
         Coupling::Sparse(slopes) => {
             let hessian = SparseHessian {
                 slopes,
                 diagonal: &equations.diagonal,
-                prior: &prior,
+                prior,
             };
             bootstrap(hessian, scores)
         }
@@ -115,20 +113,19 @@ pub fn standard_errors(
 /// sparse rows, errors of parameters that few clusters determine are too small.
 pub fn leave_one_out(
     equations: &NormalEquations,
+    prior: &PriorTerms,
     clusters: &[Linearised],
     robust: &RobustWeights,
-    free: &[usize],
-    at: &Unknowns,
 ) -> SparseRows {
-    let Coupling::Dense(_) = &equations.coupling else {
-        return SparseRows::scores(clusters, free.len(), robust, |_| DVec3::ONE);
+    let n = equations.diagonal.len();
+    let Coupling::Dense(hessian) = &equations.coupling else {
+        return SparseRows::scores(clusters, n, robust, |_| DVec3::ONE);
     };
-    let prior = PriorTerms::new(equations, free, at);
     let inverses: Vec<Option<DMatrix<f64>>> = (0..3)
         .into_par_iter()
-        .map(|c| inverse(equations, &prior, c))
+        .map(|c| inverse(&hessian[c], prior, c))
         .collect();
-    SparseRows::scores(clusters, free.len(), robust, |index| {
+    SparseRows::scores(clusters, n, robust, |index| {
         let cluster = &clusters[index];
         let weight = robust.weight(cluster);
         DVec3::from_array(std::array::from_fn(|c| {
@@ -153,13 +150,9 @@ fn quadratic(matrix: &DMatrix<f64>, cluster: &Linearised, channel: usize) -> f64
 
 /// Inverse of one channel's Hessian plus the prior, over the prior's parameters, which are the first ones; damped as far as needed
 /// to be positive definite, `None` if that fails.
-fn inverse(
-    equations: &NormalEquations,
-    prior: &PriorTerms,
-    channel: usize,
-) -> Option<DMatrix<f64>> {
+fn inverse(hessian: &DMatrix<f64>, prior: &PriorTerms, channel: usize) -> Option<DMatrix<f64>> {
     let n = prior.added.len();
-    let hessian = equations.with_couplings(prior, channel);
+    let hessian = prior.couple(hessian, channel);
     let mut damping = 0.0;
     while damping < 1e6 {
         let matrix = DMatrix::from_fn(n, n, |a, b| {
@@ -180,13 +173,13 @@ fn inverse(
 
 /// Variances from dense matrices; −1 in channels without an inverse.
 fn sandwich(
-    equations: &NormalEquations,
+    hessian: &[DMatrix<f64>; 3],
     scatter: &[DMatrix<f64>; 3],
     prior: &PriorTerms,
 ) -> Vec<DVec3> {
     let n = prior.added.len();
     per_channel(|channel| {
-        let Some(bread) = inverse(equations, prior, channel) else {
+        let Some(bread) = inverse(&hessian[channel], prior, channel) else {
             return vec![-1.0; n];
         };
         let scatter = &scatter[channel];
@@ -234,21 +227,21 @@ fn bootstrap(hessian: SparseHessian, scores: &SparseRows) -> Vec<DVec3> {
         .collect()
 }
 
-/// Score tests (Rao 1948) of the parameters in `free` after the first `active` ones: for each, the step that it would take if it
-/// were set free together with the active ones, and the standard error of the step. `scores` are [`SparseRows::scores`].
+/// Score tests (Rao 1948) of the parameters in `free` after the active ones, which come first and have the terms `prior`: for each,
+/// the step that it would take if it were set free together with the active ones, and the standard error of the step. `scores` are
+/// [`SparseRows::scores`].
 pub fn score_tests(
     equations: &NormalEquations,
+    prior: &PriorTerms,
     scores: &SparseRows,
     free: &[usize],
-    active: usize,
-    at: &Unknowns,
 ) -> Vec<ScoreTest> {
-    let prior = PriorTerms::new(equations, &free[..active], at);
+    let active = prior.added.len();
     let eliminated = match &equations.coupling {
         Coupling::Dense(hessian) => {
-            eliminate_dense(equations, hessian, &scores.gram(), &prior, active)
+            eliminate_dense(equations, hessian, &scores.gram(), prior, active)
         }
-        Coupling::Sparse(slopes) => eliminate_sparse(equations, slopes, scores, &prior, active),
+        Coupling::Sparse(slopes) => eliminate_sparse(equations, slopes, scores, prior, active),
     };
     (eliminated.into_iter().zip(active..))
         .map(|((curvature, variance), row)| {
@@ -279,7 +272,7 @@ fn eliminate_dense(
     // The curvatures of all tested parameters, then their variances.
     let values = per_channel(|channel| {
         let (hessian, scatter) = (&hessian[channel], &scatter[channel]);
-        let Some(inverse) = inverse(equations, prior, channel) else {
+        let Some(inverse) = inverse(hessian, prior, channel) else {
             return vec![0.0; 2 * tested];
         };
         let active_scatter = DMatrix::from_fn(active, active, |a, b| scatter[(a.max(b), a.min(b))]);
@@ -362,6 +355,7 @@ fn eliminate_sparse(
 mod tests {
     use super::*;
     use crate::inverse::fit::prior::Prior;
+    use crate::inverse::unknowns::Unknowns;
 
     /// The mean of n values of deviation one. With residuals over 1 − 1/n, the variance is the textbook's Σ r² / (n (n − 1))
     /// times n / (n − 1); the plain scores give Σ r² / n².
@@ -376,12 +370,13 @@ mod tests {
                 })
                 .collect();
             let prior = Prior::new(1, 1, Vec3::ONE);
-            let (even, free, at) = (RobustWeights::even(1), [1], Unknowns::new(1));
+            let (even, free) = (RobustWeights::even(1), [1]);
             let equations = NormalEquations::new(&clusters, 1, &even, &prior);
             let scores = SparseRows::scores(&clusters, 1, &even, |_| DVec3::ONE);
-            let plain = standard_errors(&equations, &scores, &free, &at).emission[0].x;
-            let kept = leave_one_out(&equations, &clusters, &even, &free, &at);
-            let error = standard_errors(&equations, &kept, &free, &at).emission[0].x;
+            let terms = PriorTerms::new(&equations, &free, &Unknowns::new(1));
+            let plain = standard_errors(&equations, &terms, &scores, &free, 1).emission[0].x;
+            let kept = leave_one_out(&equations, &terms, &clusters, &even);
+            let error = standard_errors(&equations, &terms, &kept, &free, 1).emission[0].x;
             let n = count as f32;
             assert!((plain - n.sqrt().recip()).abs() < 1e-4, "{plain}");
             assert!((error - n.sqrt() / (n - 1.0)).abs() < 1e-4, "{error}");
@@ -402,7 +397,8 @@ mod tests {
         let even = RobustWeights::even(1);
         let equations = NormalEquations::new(&clusters, 1, &even, &prior);
         let scores = SparseRows::scores(&clusters, 1, &even, |_| DVec3::ONE);
-        let error = standard_errors(&equations, &scores, &[0], &Unknowns::new(1)).albedo[0].x;
+        let terms = PriorTerms::new(&equations, &[0], &Unknowns::new(1));
+        let error = standard_errors(&equations, &terms, &scores, &[0], 1).albedo[0].x;
         assert!((error - ALBEDO_DEVIATION).abs() < 1e-4, "{error}");
     }
 }

@@ -11,7 +11,7 @@ use crate::inverse::paths::evaluate::Linearised;
 use crate::inverse::roles::places;
 use crate::inverse::unknowns::Unknowns;
 use glam::DVec3;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 /// Damping relative to the diagonal; only guards the factorisation against rounding.
 pub const MIN_DAMPING: f64 = 1e-10;
@@ -59,15 +59,16 @@ pub fn fit<E>(
     };
     let mut unknowns = start.clone();
     let (mut clusters, mut equations) = linearised(&unknowns);
+    let mut terms = PriorTerms::new(&equations, free, &unknowns);
     let mut iterations = 0;
     let mut damping = MIN_DAMPING;
     let mut before = f64::INFINITY;
     while iterations < max_steps {
-        let gradient = relative_gradient(&equations, free, &unknowns);
+        let gradient = relative_gradient(&equations, &terms, free, &unknowns);
         if is_stalled(before, gradient) {
             break;
         }
-        let (proposal, length) = propose(&equations, free, &unknowns, damping);
+        let (proposal, length) = propose(&equations, &terms, free, &unknowns, damping);
         let (clusters_after, after) = linearised(&proposal);
         iterations += 1;
         between(&after)?;
@@ -78,6 +79,7 @@ pub fn fit<E>(
         }
         damping = (damping * 0.01).max(MIN_DAMPING);
         (unknowns, clusters, equations, before) = (proposal, clusters_after, after, gradient);
+        terms = PriorTerms::new(&equations, free, &unknowns);
         if length.step < STEP_TOLERANCE {
             break;
         }
@@ -104,17 +106,19 @@ pub fn is_stalled(before: f64, after: f64) -> bool {
 
 /// Sum over parameters of the squared gradient over the curvature, relative to its expectation from noise alone. Gradients that
 /// point out of the bounds do not count. About one if only noise is left.
-pub fn relative_gradient(equations: &NormalEquations, free: &[usize], at: &Unknowns) -> f64 {
+pub fn relative_gradient(
+    equations: &NormalEquations,
+    prior: &PriorTerms,
+    free: &[usize],
+    at: &Unknowns,
+) -> f64 {
     let (mut total, mut expected) = (0.0, 0.0);
-    let prior = PriorTerms::new(equations, free, at);
-    let gradients = gradients(equations, &prior, free, at).into_iter();
+    let gradients = gradients(equations, prior, free, at).into_iter();
     for (row, (gradient, &i)) in gradients.zip(free).enumerate() {
-        let (x, upper) = (at.value(i).as_dvec3(), at.upper(i));
         let curvature = equations.diagonal[row];
         for channel in 0..3 {
-            let [x, g, h] = [x, gradient, curvature].map(|v| v[channel]);
-            let held = (x <= 0.0 && g < 0.0) || (x >= upper && g > 0.0);
-            if h > 0.0 && !held {
+            let [g, h] = [gradient, curvature].map(|v| v[channel]);
+            if h > 0.0 && !at.is_held(i, channel, g) {
                 total += g * g / h;
                 expected += equations.scatter[row][channel] / h;
             }
@@ -154,13 +158,13 @@ pub struct StepLength {
 /// The unknowns after one bounded step from `from`, and the step's length.
 pub fn propose(
     equations: &NormalEquations,
+    prior: &PriorTerms,
     free: &[usize],
     from: &Unknowns,
     damping: f64,
 ) -> (Unknowns, StepLength) {
     let x: Vec<DVec3> = free.iter().map(|&i| from.value(i).as_dvec3()).collect();
-    let prior = PriorTerms::new(equations, free, from);
-    let descent = gradients(equations, &prior, free, from);
+    let descent = gradients(equations, prior, free, from);
     let added = |damping: f64| -> Vec<DVec3> {
         (prior.added.iter().zip(&equations.diagonal))
             .map(|(added, diagonal)| *diagonal * damping + *added)
@@ -168,12 +172,14 @@ pub fn propose(
     };
     let upper: Vec<f64> = free.iter().map(|&i| from.upper(i)).collect();
     let step = match &equations.coupling {
-        Coupling::Dense(_) => dense_step(equations, &prior, &x, &descent, &upper, damping, &added),
+        Coupling::Dense(hessian) => {
+            dense_step(hessian, prior, &x, &descent, &upper, damping, &added)
+        }
         Coupling::Sparse(slopes) => {
             let hessian = SparseHessian {
                 slopes,
                 diagonal: &equations.diagonal,
-                prior: &prior,
+                prior,
             };
             hessian.bounded_step(&x, &descent, &added(damping), &upper)
         }
@@ -201,7 +207,7 @@ pub fn propose(
 
 /// The step of each channel, damped as far as needed to be solvable; zero if no damping helps.
 fn dense_step(
-    equations: &NormalEquations,
+    hessian: &[DMatrix<f64>; 3],
     prior: &PriorTerms,
     x: &[DVec3],
     descent: &[DVec3],
@@ -211,7 +217,7 @@ fn dense_step(
 ) -> Vec<DVec3> {
     per_channel(|channel| {
         let of = |all: &[DVec3]| -> Vec<f64> { all.iter().map(|v| v[channel]).collect() };
-        let hessian = equations.with_couplings(prior, channel);
+        let hessian = prior.couple(&hessian[channel], channel);
         let (x, descent) = (of(x), DVector::from_vec(of(descent)));
         let mut damping = damping;
         while damping < 1e9 {
@@ -329,7 +335,8 @@ mod tests {
         let equations = NormalEquations::new(&[noisy], 1, &RobustWeights::even(1), &prior);
         assert!(equations.objective.max_element() < 0.0);
         let start = Unknowns::grey([0.5], [0.0]);
-        let (next, _) = propose(&equations, &[0], &start, MIN_DAMPING);
+        let terms = PriorTerms::new(&equations, &[0], &start);
+        let (next, _) = propose(&equations, &terms, &[0], &start, MIN_DAMPING);
         // One residual of 0.4, a half difference of 0.6 and a prior of 0.01, which weighs 60² times as much.
         let expected = 0.5 + 0.4 / (1.0 + 60.0 * 60.0);
         assert!((next.albedo[0] - expected).abs().max_element() < 1e-6);

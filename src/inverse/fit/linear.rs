@@ -5,6 +5,7 @@ use crate::inverse::fit::gauss_newton::{
     MIN_DAMPING, STEP_TOLERANCE, is_stalled, propose, relative_gradient,
 };
 use crate::inverse::fit::prior::Prior;
+use crate::inverse::fit::prior_terms::PriorTerms;
 use crate::inverse::fit::robust_weights::RobustWeights;
 use crate::inverse::paths::evaluate::Linearised;
 use crate::inverse::unknowns::Unknowns;
@@ -22,6 +23,8 @@ pub struct Descended {
     pub robust: RobustWeights,
     /// The normal equations at the solution.
     pub equations: NormalEquations,
+    /// The prior's terms in these.
+    pub terms: PriorTerms,
     /// The clusters with their residuals at the solution.
     pub clusters: Vec<Linearised>,
 }
@@ -47,13 +50,15 @@ pub fn descend(
     loop {
         let robust = RobustWeights::from_residuals(&clusters, about.surfaces());
         let equations = NormalEquations::new(&clusters, free.len(), &robust, prior);
-        let (next, length) = propose(&equations, free, &unknowns, MIN_DAMPING);
-        let gradient = relative_gradient(&equations, free, &unknowns);
+        let terms = PriorTerms::new(&equations, free, &unknowns);
+        let (next, length) = propose(&equations, &terms, free, &unknowns, MIN_DAMPING);
+        let gradient = relative_gradient(&equations, &terms, free, &unknowns);
         if length.remaining < STEP_TOLERANCE || is_stalled(before, gradient) || steps == MAX_STEPS {
             return Descended {
                 unknowns,
                 robust,
                 equations,
+                terms,
                 clusters,
             };
         }
@@ -95,7 +100,8 @@ mod tests {
         let (one, _) = {
             let robust = RobustWeights::even(1);
             let equations = NormalEquations::new(&clusters, 1, &robust, &prior);
-            propose(&equations, &[0], &about, MIN_DAMPING)
+            let terms = PriorTerms::new(&equations, &[0], &about);
+            propose(&equations, &terms, &[0], &about, MIN_DAMPING)
         };
         assert!(one.albedo[0].x < 0.5, "{}", one.albedo[0]);
         let found = descend(clusters, &about, &about, &[0], &prior);

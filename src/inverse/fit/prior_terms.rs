@@ -6,8 +6,10 @@ use crate::inverse::unknowns::Unknowns;
 use crate::math::cholesky;
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
+use std::borrow::Cow;
 
 /// The prior of the free parameters, in the units of the normal equations: precisions are times the variance of a cluster.
+#[derive(Debug, Clone)]
 pub struct PriorTerms {
     /// Mean of each parameter.
     pub mean: Vec<DVec3>,
@@ -24,6 +26,7 @@ pub struct PriorTerms {
 }
 
 /// The precision of correlated parameters.
+#[derive(Debug, Clone)]
 pub struct Block {
     /// Their rows among the free parameters.
     pub rows: Vec<usize>,
@@ -63,7 +66,8 @@ impl PriorTerms {
         terms
     }
 
-    /// Sets the prior of sky directions, given what the pixels say of them in all channels.
+    /// Sets the prior of sky directions, given what the pixels say of them in all channels. Without a joint distribution, or if
+    /// rounding leaves a matrix of it indefinite, each direction keeps its own prior.
     fn correlate(
         &mut self,
         equations: &NormalEquations,
@@ -142,8 +146,7 @@ impl PriorTerms {
             let others: Vec<usize> = (0..free.len())
                 .filter(|row| rows.binary_search(row).is_err())
                 .filter(|&row| {
-                    let (x, g) = (value(row)[channel], gradient(row));
-                    let held = (x <= 0.0 && g < 0.0) || (x >= at.upper(free[row]) && g > 0.0);
+                    let held = at.is_held(free[row], channel, gradient(row));
                     !held && equations.diagonal[row][channel] > 0.0
                 })
                 .collect();
@@ -234,6 +237,15 @@ impl PriorTerms {
             }
         }
         scores
+    }
+
+    /// The Hessian of one channel with the off-diagonal entries of the precision added. Only the lower triangle is set.
+    pub fn couple<'a>(&self, hessian: &'a DMatrix<f64>, channel: usize) -> Cow<'a, DMatrix<f64>> {
+        let mut hessian = Cow::Borrowed(hessian);
+        for (row, column, value) in self.couplings(channel) {
+            hessian.to_mut()[(row, column)] += value;
+        }
+        hessian
     }
 
     /// The off-diagonal entries of the precision of one channel, as rows, columns and values of the lower triangle.

@@ -140,7 +140,7 @@ impl SparseHessian<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inverse::fit::equations::NormalEquations;
+    use crate::inverse::fit::equations::{Coupling, NormalEquations};
     use crate::inverse::fit::errors::{score_tests, standard_errors};
     use crate::inverse::fit::gauss_newton::propose;
     use crate::inverse::fit::prior::Prior;
@@ -202,7 +202,10 @@ mod tests {
     fn rows_take_the_same_bounded_step_as_matrices() {
         let free: Vec<usize> = (0..FREE).collect();
         let from = Unknowns::new(SURFACES);
-        let [dense, sparse] = both().0.map(|e| propose(&e, &free, &from, 1e-10).0);
+        let [dense, sparse] = both().0.map(|e| {
+            let terms = PriorTerms::new(&e, &free, &from);
+            propose(&e, &terms, &free, &from, 1e-10).0
+        });
         let mut at_bounds = 0;
         for &i in &free {
             assert!((dense.value(i) - sparse.value(i)).length() < 1e-5, "{i}");
@@ -215,8 +218,10 @@ mod tests {
     fn drawn_standard_errors_are_those_of_matrices() {
         let free: Vec<usize> = (0..FREE).collect();
         let (equations, scores) = both();
-        let [dense, sparse] =
-            equations.map(|e| standard_errors(&e, &scores, &free, &Unknowns::new(SURFACES)));
+        let [dense, sparse] = equations.map(|e| {
+            let terms = PriorTerms::new(&e, &free, &Unknowns::new(SURFACES));
+            standard_errors(&e, &terms, &scores, &free, SURFACES)
+        });
         let ratios: Vec<f64> = (dense.albedo.iter().zip(&sparse.albedo))
             .flat_map(|(a, b)| (*b / *a).to_array())
             .map(f64::from)
@@ -229,9 +234,12 @@ mod tests {
 
     #[test]
     fn what_is_released_is_tested_alike() {
-        let (free, at): (Vec<usize>, _) = ((0..FREE).collect(), Unknowns::new(SURFACES));
+        let free: Vec<usize> = (0..FREE).collect();
         let (equations, scores) = both();
-        let [dense, sparse] = equations.map(|e| score_tests(&e, &scores, &free, SURFACES, &at));
+        let [dense, sparse] = equations.map(|e| {
+            let terms = PriorTerms::new(&e, &free[..SURFACES], &Unknowns::new(SURFACES));
+            score_tests(&e, &terms, &scores, &free)
+        });
         for (a, b) in dense.iter().zip(&sparse) {
             for c in 0..3 {
                 for ratio in [a.step[c] / b.step[c], a.stderr[c] / b.stderr[c]] {
@@ -241,17 +249,20 @@ mod tests {
         }
     }
 
-    /// Two correlated directions beside the other parameters: the sparse rows solve the same system as its matrix.
-    #[test]
-    fn a_correlated_prior_is_solved_as_with_matrices() {
-        const SEEN: usize = SURFACES - 2;
-        let expected = ExpectedSky {
+    fn two_directions() -> ExpectedSky {
+        ExpectedSky {
             radiance: vec![Vec3::new(1.0, 2.0, 3.0), Vec3::ONE],
             covariance: Some(DMatrix::from_row_slice(2, 2, &[0.5, 0.4, 0.4, 0.6])),
             has_color: vec![true; 2],
             shape: Vec::new(),
-        };
-        let prior = Prior::new(SURFACES, SEEN, Vec3::ONE).with_sky(Some(&expected));
+        }
+    }
+
+    /// Two correlated directions beside the other parameters: the sparse rows solve the same system as its matrix.
+    #[test]
+    fn a_correlated_prior_is_solved_as_with_matrices() {
+        const SEEN: usize = SURFACES - 2;
+        let prior = Prior::new(SURFACES, SEEN, Vec3::ONE).with_sky(Some(&two_directions()));
         let free: Vec<usize> = (0..FREE - 2)
             .chain([SURFACES + SEEN, SURFACES + SEEN + 1])
             .collect();
@@ -269,8 +280,11 @@ mod tests {
         let values: Vec<DVec3> = free.iter().map(|&i| at.value(i).as_dvec3()).collect();
         let (right, one) = (terms.pull(&values), vec![DVec3::ONE; FREE]);
         let found = hessian.solve(&terms.added, &one, &right, &vec![DVec3::ZERO; FREE], 1e-9);
+        let Coupling::Dense(hessians) = &dense.coupling else {
+            panic!("few parameters have matrices");
+        };
         for c in 0..3 {
-            let mut matrix = dense.with_couplings(&terms, c).into_owned();
+            let mut matrix = terms.couple(&hessians[c], c).into_owned();
             matrix.fill_upper_triangle_with_lower_triangle();
             for (row, added) in terms.added.iter().enumerate() {
                 matrix[(row, row)] += added[c];
@@ -286,14 +300,9 @@ mod tests {
     /// The pull of a correlated prior is minus half the derivative of its squared distance, by finite differences.
     #[test]
     fn a_correlated_prior_pulls_downhill() {
-        let expected = ExpectedSky {
-            radiance: vec![Vec3::ONE; 2],
-            covariance: Some(DMatrix::from_row_slice(2, 2, &[0.5, 0.4, 0.4, 0.6])),
-            has_color: vec![true; 2],
-            shape: Vec::new(),
-        };
-        let prior = Prior::new(SURFACES, SURFACES - 2, Vec3::ONE).with_sky(Some(&expected));
-        let free: Vec<usize> = (2 * SURFACES - 2 - (FREE - 2)..2 * SURFACES).collect();
+        let prior = Prior::new(SURFACES, SURFACES - 2, Vec3::ONE);
+        let prior = prior.with_sky(Some(&two_directions()));
+        let free: Vec<usize> = (2 * SURFACES - FREE..2 * SURFACES).collect();
         let at = Unknowns::new(SURFACES);
         let even = RobustWeights::even(SURFACES);
         let equations = NormalEquations::new(&clusters(), FREE, &even, &prior);

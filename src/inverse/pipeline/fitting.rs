@@ -3,6 +3,7 @@
 use crate::inverse::fit::equations::NormalEquations;
 use crate::inverse::fit::errors::{ScoreTest, StandardErrors, score_tests, standard_errors};
 use crate::inverse::fit::gauss_newton::{Fit, fit};
+use crate::inverse::fit::prior_terms::PriorTerms;
 use crate::inverse::fit::robust_weights::RobustWeights;
 use crate::inverse::fit::sparse_rows::SparseRows;
 use crate::inverse::known::Pinned;
@@ -66,7 +67,8 @@ impl Pipeline<'_, '_> {
         let (n, robust) = (free.len(), &self.robust);
         let equations = NormalEquations::new(&clusters, n, robust, &self.prior);
         let scores = SparseRows::scores(&clusters, n, robust, |_| DVec3::ONE);
-        score_tests(&equations, &scores, free, active, &self.unknowns)
+        let terms = PriorTerms::new(&equations, &free[..active], &self.unknowns);
+        score_tests(&equations, &terms, &scores, free)
     }
 
     /// Sets the robust weights and the model error from the residuals of the last fit, and fits again.
@@ -84,7 +86,9 @@ impl Pipeline<'_, '_> {
     pub(super) fn take(&mut self, fitted: &Fit) {
         let free = self.free();
         let scores = SparseRows::scores(&fitted.clusters, free.len(), &self.robust, |_| DVec3::ONE);
-        let errors = standard_errors(&fitted.equations, &scores, &free, &fitted.unknowns);
+        let terms = PriorTerms::new(&fitted.equations, &free, &fitted.unknowns);
+        let surfaces = self.roles.len();
+        let errors = standard_errors(&fitted.equations, &terms, &scores, &free, surfaces);
         self.merge_errors(errors);
         self.take_values(fitted);
     }

@@ -5,6 +5,7 @@ use crate::inverse::fit::equations::NormalEquations;
 use crate::inverse::fit::errors::StandardErrors;
 use crate::inverse::fit::gauss_newton::{MIN_DAMPING, propose};
 use crate::inverse::fit::prior::Prior;
+use crate::inverse::fit::prior_terms::PriorTerms;
 use crate::inverse::fit::robust_weights::RobustWeights;
 use crate::inverse::outside::MeasuredOutside;
 use crate::inverse::paths::PathCache;
@@ -352,7 +353,8 @@ impl Pipeline<'_, '_> {
         let linearised = cache.linearise(&self.unknowns, &roles::places(&free, surfaces), &[]);
         let even = RobustWeights::even(surfaces);
         let equations = NormalEquations::new(&linearised, free.len(), &even, &self.prior);
-        let (after, _) = propose(&equations, &free, &self.unknowns, MIN_DAMPING);
+        let terms = PriorTerms::new(&equations, &free, &self.unknowns);
+        let (after, _) = propose(&equations, &terms, &free, &self.unknowns, MIN_DAMPING);
         let steps: Vec<DVec3> = (free.iter())
             .map(|&i| (after.value(i) - self.unknowns.value(i)).as_dvec3())
             .collect();

@@ -194,14 +194,9 @@ impl Pipeline<'_, '_> {
         let free = roles::free(&self.roles, |k| self.has_free_albedo(k));
         let prior = lamp_albedo::without_lamps(&self.prior, &self.roles);
         let found = descend(clusters, about, &self.unknowns, &free, &prior);
-        let scores = leave_one_out(
-            &found.equations,
-            &found.clusters,
-            &found.robust,
-            &free,
-            &found.unknowns,
-        );
-        let errors = standard_errors(&found.equations, &scores, &free, &found.unknowns);
+        let (equations, terms) = (&found.equations, &found.terms);
+        let scores = leave_one_out(equations, terms, &found.clusters, &found.robust);
+        let errors = standard_errors(equations, terms, &scores, &free, self.roles.len());
         self.unknowns.clone_from(&found.unknowns);
         self.tell_model_error(&found.clusters);
         lamp_albedo::leave_out(&mut self.unknowns, &self.roles);

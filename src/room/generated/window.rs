@@ -156,15 +156,10 @@ fn outside(f: &mut Furnisher, level: f64, opening: &Opening) -> Option<Environme
         .map(|pixel| direction_of(width, height, pixel))
         .collect();
     let is_sky = |direction: &&Vec3| direction.y > 0.0;
-    let weighed = |d: &Vec3| sky.luminance(*d) * (1.0 - d.y * d.y).sqrt();
-    let sum: f32 = directions.iter().filter(is_sky).map(weighed).sum();
     let solid_angle = |d: &Vec3| (1.0 - d.y * d.y).sqrt();
-    let mean = sum
-        / directions
-            .iter()
-            .filter(is_sky)
-            .map(solid_angle)
-            .sum::<f32>();
+    let above = || directions.iter().filter(is_sky);
+    let sum: f32 = above().map(|d| sky.luminance(*d) * solid_angle(d)).sum();
+    let mean = sum / above().map(solid_angle).sum::<f32>();
     let pixels = (directions.iter())
         .map(|direction| {
             let light = if direction.y > 0.0 {
