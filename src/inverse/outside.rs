@@ -8,7 +8,7 @@ use crate::calibrate::problem::Problem;
 use crate::inverse::sky::{ExpectedSky, Map, Seen, solid_angle};
 use crate::math::color::luminance;
 use crate::scene::camera::level_up;
-use crate::transport::environment::{Environment, direction_of, pixel_of};
+use crate::transport::environment::{Environment, direction_of, directions, pixel_of};
 use crate::transport::surroundings::Surroundings;
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
@@ -275,10 +275,8 @@ impl MeasuredOutside {
         excess: impl Fn(Vec3) -> Vec3,
         elsewhere: impl Fn(Vec3) -> Vec3,
     ) -> Vec<Vec3> {
-        let [width, height] = self.map.size();
-        (0..width * height)
-            .map(|cell| {
-                let direction = direction_of(width, height, cell);
+        (directions(self.map.size()).enumerate())
+            .map(|(cell, direction)| {
                 let from = towards.unwrap_or(direction);
                 let half = self.half(from);
                 let radiance = self.map.pixels_from(from)[cell];

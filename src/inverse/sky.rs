@@ -6,7 +6,7 @@
 
 use crate::math::cholesky;
 use crate::math::color::luminance;
-use crate::transport::environment::{direction_of, pixel_of};
+use crate::transport::environment::{directions, pixel_of};
 use glam::{DVec3, Vec3};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
@@ -198,11 +198,6 @@ fn covariance(a: Vec3, b: Vec3, up: Vec3) -> f64 {
         + PATCH * PATCH * (-angle / PATCH_ANGLE).exp()
 }
 
-/// The unit directions of a map's pixels, with columns and rows.
-fn directions([width, height]: [usize; 2]) -> impl Iterator<Item = Vec3> {
-    (0..width * height).map(move |pixel| direction_of(width, height, pixel))
-}
-
 /// The solid angle of a map's cell in a direction, up to a factor.
 pub fn solid_angle(direction: Vec3) -> f64 {
     f64::from(1.0 - direction.y * direction.y).max(0.0).sqrt()
@@ -211,6 +206,7 @@ pub fn solid_angle(direction: Vec3) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::transport::environment::direction_of;
 
     fn seen(direction: Vec3, radiance: f32) -> Seen {
         Seen {

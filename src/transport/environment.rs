@@ -250,6 +250,11 @@ pub fn direction_of(width: usize, height: usize, pixel: usize) -> Vec3 {
     )
 }
 
+/// The unit directions of the pixels' centres in a `width` × `height` map, row by row.
+pub fn directions([width, height]: [usize; 2]) -> impl Iterator<Item = Vec3> {
+    (0..width * height).map(move |pixel| direction_of(width, height, pixel))
+}
+
 /// cosθ at the upper and lower edge of a row.
 pub fn row_cosines(row: usize, height: usize) -> (f64, f64) {
     (row_cosine(row, height), row_cosine(row + 1, height))

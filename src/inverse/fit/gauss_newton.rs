@@ -33,6 +33,8 @@ pub struct Fit {
     pub clusters: Vec<Linearised>,
     /// The normal equations of these.
     pub equations: NormalEquations,
+    /// The prior's terms in the equations.
+    pub terms: PriorTerms,
     /// Number of steps taken.
     pub iterations: u64,
 }
@@ -88,6 +90,7 @@ pub fn fit<E>(
         unknowns,
         clusters,
         equations,
+        terms,
         iterations,
     })
 }

@@ -6,7 +6,7 @@ use crate::inverse::outside::MeasuredOutside;
 use crate::inverse::pipeline::Pipeline;
 use crate::inverse::roles::Role;
 use crate::math::color::luminance;
-use crate::transport::environment::direction_of;
+use crate::transport::environment::directions;
 use crate::transport::sun::Sun;
 use crate::transport::surroundings::Surroundings;
 use glam::{DVec3, Vec3};
@@ -100,9 +100,7 @@ impl Pipeline<'_, '_> {
         let filled = |towards: Option<Vec3>| -> Vec<Vec3> {
             match sky {
                 Some(sky) => sky.filled(towards, |from| emission(grid.excess(from)), elsewhere),
-                None => (0..width * height)
-                    .map(|pixel| elsewhere(direction_of(width, height, pixel)))
-                    .collect(),
+                None => directions([width, height]).map(elsewhere).collect(),
             }
         };
         let pixels = filled(boxed.then_some(-grid.up));

@@ -86,9 +86,8 @@ impl Pipeline<'_, '_> {
     pub(super) fn take(&mut self, fitted: &Fit) {
         let free = self.free();
         let scores = SparseRows::scores(&fitted.clusters, free.len(), &self.robust, |_| DVec3::ONE);
-        let terms = PriorTerms::new(&fitted.equations, &free, &fitted.unknowns);
-        let surfaces = self.roles.len();
-        let errors = standard_errors(&fitted.equations, &terms, &scores, &free, surfaces);
+        let (equations, terms) = (&fitted.equations, &fitted.terms);
+        let errors = standard_errors(equations, terms, &scores, &free, self.roles.len());
         self.merge_errors(errors);
         self.take_values(fitted);
     }

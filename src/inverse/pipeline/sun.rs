@@ -15,7 +15,7 @@ use crate::inverse::unknowns::Unknowns;
 use crate::math::color::{luminance, luminance_f64};
 use crate::scene::Scene;
 use crate::scene::geometry::{Ray, offset_origin};
-use crate::transport::environment::direction_of;
+use crate::transport::environment::directions;
 use crate::transport::surroundings::Surroundings;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -202,7 +202,7 @@ impl Search<'_> {
 
     /// The best direction that may hold a sun, with the fall of χ².
     fn best(&self, up: Vec3, may_hold: impl Fn(Vec3) -> bool + Sync) -> Option<(Vec3, f64)> {
-        let mut candidates: Vec<Vec3> = directions(COLUMNS[0]).collect();
+        let mut candidates: Vec<Vec3> = directions([COLUMNS[0], COLUMNS[0] / 2]).collect();
         let mut ranked = Vec::new();
         for (level, columns) in COLUMNS.into_iter().enumerate() {
             let step = self.patches.len().div_ceil(CLUSTERS[level]).max(1);
@@ -220,17 +220,12 @@ impl Search<'_> {
             };
             // Of the next map those pixels that lie in the kept ones or touch them.
             let reach = (std::f32::consts::TAU / columns as f32).cos();
-            candidates = directions(*finer)
+            candidates = directions([*finer, *finer / 2])
                 .filter(|d| ranked.iter().any(|(kept, _)| kept.dot(*d) >= reach))
                 .collect();
         }
         ranked.first().copied()
     }
-}
-
-fn directions(columns: usize) -> impl Iterator<Item = Vec3> {
-    let rows = columns / 2;
-    (0..columns * rows).map(move |pixel| direction_of(columns, rows, pixel))
 }
 
 impl Pipeline<'_, '_> {
@@ -273,7 +268,7 @@ impl Pipeline<'_, '_> {
         let mut best = sun;
         for columns in FINE_COLUMNS {
             let reach = (FINE_REACH * std::f32::consts::TAU / columns as f32).cos();
-            let candidates: Vec<Vec3> = (directions(columns))
+            let candidates: Vec<Vec3> = (directions([columns, columns / 2]))
                 .filter(|d| d.dot(best) >= reach && d.dot(self.problem.scene.up) > 0.0)
                 .collect();
             let ranked = (candidates.into_par_iter().chain([best]))

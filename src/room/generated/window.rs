@@ -3,7 +3,7 @@
 use crate::room::generated::furnisher::{Furnisher, walls};
 use crate::room::generated::sky::{KINDS, Sky};
 use crate::room::shape::Modeller;
-use crate::transport::environment::{Environment, direction_of};
+use crate::transport::environment::{Environment, directions};
 use crate::transport::sun::Sun;
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
@@ -152,9 +152,7 @@ fn outside(f: &mut Furnisher, level: f64, opening: &Opening) -> Option<Environme
     let warmth = f.color(1.0, 0.3);
 
     let [width, height] = MAP;
-    let directions: Vec<Vec3> = (0..width * height)
-        .map(|pixel| direction_of(width, height, pixel))
-        .collect();
+    let directions: Vec<Vec3> = directions(MAP).collect();
     let is_sky = |direction: &&Vec3| direction.y > 0.0;
     let solid_angle = |d: &Vec3| (1.0 - d.y * d.y).sqrt();
     let above = || directions.iter().filter(is_sky);
