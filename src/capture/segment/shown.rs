@@ -29,28 +29,27 @@ pub struct ShownFace {
 /// saturated: a lamp or a window.
 ///
 /// Faces with few pixels are smoothed by their neighbours. Unseen faces take the vertex colours if there are any, else their
-/// neighbours' colours. `own` is the square root of vertex colour per face.
+/// neighbours' colours; and whether they are saturated, which vertex colours do not tell, from their neighbours. `own` is the square
+/// root of vertex colour per face.
 pub fn filled(
     mesh: &Mesh,
     shown: &[ShownFace],
     own: &[DVec3],
     edges: &[[u32; 2]],
 ) -> (Vec<DVec3>, Vec<bool>) {
-    let mut known: Vec<Known> = shown.iter().map(Known::of).collect();
+    let seen: Vec<Known> = shown.iter().map(Known::of).collect();
+    let mut with_own = seen.clone();
     if !mesh.vertex_colors.is_empty() {
-        fill_with_own(&mut known, own);
+        fill_with_own(&mut with_own, own);
     }
-    smooth(&mut known, edges);
-    while fill_from_neighbors(&mut known, edges) {}
-    let saturated: Vec<bool> = known.iter().map(|k| k.features.w > MOSTLY).collect();
+    let [seen, with_own] = [seen, with_own].map(|known| spread(known, edges));
+    let saturated: Vec<bool> = seen.iter().map(|k| k.features.w > MOSTLY).collect();
     let pixels: Vec<f64> = shown.iter().map(|face| f64::from(face.pixels)).collect();
     let saturated = without_specks(saturated, &pixels, edges, true);
     let saturated = without_specks(saturated, &pixels, edges, false);
-    let saturated = without_highlights(saturated, &known, edges);
-    (
-        known.iter().map(|k| k.features.truncate()).collect(),
-        saturated,
-    )
+    let saturated = without_highlights(saturated, &seen, edges);
+    let colors = with_own.iter().map(|k| k.features.truncate());
+    (colors.collect(), saturated)
 }
 
 /// The features of a face, measured or filled in.
@@ -89,6 +88,13 @@ fn fill_with_own(known: &mut [Known], own: &[DVec3]) {
             };
         }
     }
+}
+
+/// Smooths the known faces and fills the unknown ones.
+fn spread(mut known: Vec<Known>, edges: &[[u32; 2]]) -> Vec<Known> {
+    smooth(&mut known, edges);
+    while fill_from_neighbors(&mut known, edges) {}
+    known
 }
 
 /// Averages each known face with its neighbours, the less the more pixels see it.
@@ -252,6 +258,33 @@ mod tests {
         let own = [DVec3::splat(0.5), DVec3::splat(0.25)];
         let (colors, _) = filled(&mesh, &faces, &own, &[]);
         assert!((colors[1] - DVec3::ONE).length() < 1e-12, "{}", colors[1]);
+    }
+
+    /// Faces of a lamp are smaller than pixels, so that one of three is seen.
+    #[test]
+    fn a_lamp_is_whole_in_a_mesh_with_vertex_colours() {
+        let (wall, lamp) = (face(0.5, 0.0, 1000), face(1.0, 1.0, 1));
+        let (before, after) = (vec![wall; 10], vec![wall; 10]);
+        let between = (0..90).map(|i| {
+            if i % 3 == 0 {
+                lamp
+            } else {
+                ShownFace::default()
+            }
+        });
+        let faces: Vec<ShownFace> = before.into_iter().chain(between).chain(after).collect();
+        let colored = Mesh {
+            vertex_colors: vec![Vec3::ONE],
+            ..Mesh::default()
+        };
+        let edges: Vec<[u32; 2]> = (1..110).map(|i| [i - 1, i]).collect();
+        for mesh in [Mesh::default(), colored] {
+            let (_, saturated) = filled(&mesh, &faces, &[DVec3::ONE; 110], &edges);
+            let expected: Vec<bool> = (0..110).map(|i| (10..100).contains(&i)).collect();
+            // Which of the unseen faces beside the wall belong to the lamp is open.
+            assert_eq!(saturated[..98], expected[..98]);
+            assert_eq!(saturated[100..], expected[100..]);
+        }
     }
 
     #[test]

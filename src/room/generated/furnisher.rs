@@ -236,6 +236,15 @@ impl Furnisher {
         self.views.push(View::towards(eye, target));
     }
 
+    /// Turns each view that looks up as far down.
+    pub fn look_down(&mut self) {
+        for view in &mut self.views {
+            let (eye, mut ahead) = (view.pose.center, -view.pose.rotation.z_axis);
+            ahead.y = -ahead.y.abs();
+            *view = View::towards(eye, eye + ahead);
+        }
+    }
+
     /// Draws the samples per pixel of the photographs, hence their noise.
     pub fn expose(&mut self, low: f64, high: f64) {
         self.samples = self.scaled(low, high) as u32;

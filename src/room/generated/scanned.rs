@@ -26,6 +26,8 @@ const DEPTH_KEY: u64 = 0x7363_616e;
 const WIDTH: u32 = 256;
 /// Fraction of the rooms that light from outside enters through openings.
 const OPEN: f64 = 0.4;
+/// Fraction of the rooms whose cameras never look up, so that the scan lacks most of the ceiling.
+const LOOKING_DOWN: f64 = 0.5;
 /// Fraction of the objects that have a pattern.
 const PATTERNED: f64 = 0.4;
 /// Metres per unit of the depth images.
@@ -39,7 +41,7 @@ const POSITION_DEVIATION: f64 = 0.003;
 /// Standard deviation of the camera rotations about each axis, in radians.
 const ROTATION_DEVIATION: f64 = 0.12 / 180.0 * std::f64::consts::PI;
 
-/// A partly patterned room with many views, lit by lamps or through openings.
+/// A partly patterned room with many views, lit by lamps or through openings; in half of the rooms all views look down.
 pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
     let openings = match f.between(0.0, 1.0) < OPEN {
         true => window::shell(f),
@@ -54,6 +56,9 @@ pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
     f.look_around(12, 18);
     window::look_out(f, &openings);
     f.expose(32.0, 64.0);
+    if f.between(0.0, 1.0) < LOOKING_DOWN {
+        f.look_down();
+    }
 }
 
 /// Standard deviation in metres of a structured-light camera's depth (Nguyen, Izadi and Lovell 2012).
