@@ -13,6 +13,7 @@ use relit::math::stats::quantile;
 use relit::room::generated::{Family, Generated, generate};
 use relit::room::photographs::{self, Rendering};
 use relit::scene::Scene;
+use relit::scene::camera::Camera;
 use relit::scene::prepare::prepare;
 use relit::study::families::{Plan, Quantiles, RoomEvent, Row, run, summarize};
 use relit::transport::material::{Albedo, Material};
@@ -402,10 +403,15 @@ fn refined_poses_of_a_scan_turn_back_and_do_not_drift() {
 }
 
 #[test]
-fn scanned_rooms_have_lamps_or_openings_and_patterns() {
+fn scanned_rooms_have_lamps_or_openings_and_patterns_and_in_some_nobody_looks_up() {
     let rooms = [1, 4].map(|seed| Family::Scanned.generate(seed, [12, 9]).expect("a room"));
     assert_eq!(
         rooms.each_ref().map(|room| room.lit.outside.is_some()),
+        [false, true]
+    );
+    let looks_up = |camera: &Camera| camera.forward().y > 1e-3;
+    assert_eq!(
+        (rooms.each_ref()).map(|room| room.lit.scene.cameras.iter().any(looks_up)),
         [false, true]
     );
     for room in rooms {

@@ -27,7 +27,7 @@ const SHARED: f64 = 2.0;
 const OUTSIDE: f64 = 0.04;
 
 /// Standard error of the factor that a scan's albedos share: the root mean square of its logarithm in `relit trade --rooms 24
-/// --family scanned --preset preview` is 0.16, rounded up. What was not scanned lights the room too, and lamps saturate, so that
+/// --family scanned --preset preview` is 0.18, rounded up. What was not scanned lights the room too, and lamps saturate, so that
 /// photographs of a scan tell ratios of albedos better than albedos.
 const SCANNED: f32 = 0.2;
 
