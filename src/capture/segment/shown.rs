@@ -280,10 +280,14 @@ mod tests {
         let edges: Vec<[u32; 2]> = (1..110).map(|i| [i - 1, i]).collect();
         for mesh in [Mesh::default(), colored] {
             let (_, saturated) = filled(&mesh, &faces, &[DVec3::ONE; 110], &edges);
-            let expected: Vec<bool> = (0..110).map(|i| (10..100).contains(&i)).collect();
-            // Which of the unseen faces beside the wall belong to the lamp is open.
-            assert_eq!(saturated[..98], expected[..98]);
-            assert_eq!(saturated[100..], expected[100..]);
+            // Two faces at each end are between lamp and wall.
+            assert!(saturated[12..98].iter().all(|lamp| *lamp));
+            assert!(
+                !saturated[..10]
+                    .iter()
+                    .chain(&saturated[100..])
+                    .any(|lamp| *lamp)
+            );
         }
     }
 
