@@ -37,19 +37,19 @@ pub fn filled(
     own: &[DVec3],
     edges: &[[u32; 2]],
 ) -> (Vec<DVec3>, Vec<bool>) {
-    let seen: Vec<Known> = shown.iter().map(Known::of).collect();
-    let mut with_own = seen.clone();
-    if !mesh.vertex_colors.is_empty() {
-        fill_with_own(&mut with_own, own);
-    }
-    let [seen, with_own] = [seen, with_own].map(|known| spread(known, edges));
+    let known: Vec<Known> = shown.iter().map(Known::of).collect();
+    let seen = spread(known.clone(), edges);
+    let colors = |faces: &[Known]| faces.iter().map(|k| k.features.truncate()).collect();
+    let colors = match mesh.vertex_colors.is_empty() {
+        true => colors(&seen),
+        false => colors(&spread(with_own(known, own), edges)),
+    };
     let saturated: Vec<bool> = seen.iter().map(|k| k.features.w > MOSTLY).collect();
     let pixels: Vec<f64> = shown.iter().map(|face| f64::from(face.pixels)).collect();
     let saturated = without_specks(saturated, &pixels, edges, true);
     let saturated = without_specks(saturated, &pixels, edges, false);
     let saturated = without_highlights(saturated, &seen, edges);
-    let colors = with_own.iter().map(|k| k.features.truncate());
-    (colors.collect(), saturated)
+    (colors, saturated)
 }
 
 /// The features of a face, measured or filled in.
@@ -72,7 +72,7 @@ impl Known {
 }
 
 /// Fills unseen faces with vertex colours, scaled per channel to the photographs.
-fn fill_with_own(known: &mut [Known], own: &[DVec3]) {
+fn with_own(mut known: Vec<Known>, own: &[DVec3]) -> Vec<Known> {
     let mut sums = [DVec3::ZERO; 2];
     for (known, own) in known.iter().zip(own) {
         sums[0] += known.features.truncate() * known.weight;
@@ -88,6 +88,7 @@ fn fill_with_own(known: &mut [Known], own: &[DVec3]) {
             };
         }
     }
+    known
 }
 
 /// Smooths the known faces and fills the unknown ones.

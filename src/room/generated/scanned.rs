@@ -26,7 +26,7 @@ const DEPTH_KEY: u64 = 0x7363_616e;
 const WIDTH: u32 = 256;
 /// Fraction of the rooms that light from outside enters through openings.
 const OPEN: f64 = 0.4;
-/// Fraction of the rooms whose cameras never look up, so that the scan lacks most of the ceiling.
+/// Fraction of the rooms whose cameras never look up, so that the scan lacks a part of the ceiling.
 const LOOKING_DOWN: f64 = 0.5;
 /// Fraction of the objects that have a pattern.
 const PATTERNED: f64 = 0.4;
