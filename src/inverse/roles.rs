@@ -15,12 +15,20 @@ pub enum Role {
     Dark,
     /// It emits and reflects.
     Glowing,
+    /// All photographs of it are saturated. It is held at the least emission that they show, since the light on other objects does
+    /// not tell that it is brighter.
+    Saturated,
 }
 
 impl Role {
     /// Whether its albedo is fitted.
     pub fn reflects(self) -> bool {
         matches!(self, Self::Reflector | Self::Glowing)
+    }
+
+    /// Whether its emission hides its albedo.
+    pub fn is_lamp(self) -> bool {
+        matches!(self, Self::Emitter | Self::Saturated)
     }
 
     /// Whether its emission is fitted.

@@ -430,14 +430,13 @@ fn plan(seeds: &[u64], preset: Preset) -> Plan {
     }
 }
 
-/// The light field takes other surfaces for the lamp: none of it is found, and albedos are off by 0.066.
-#[test]
-fn preview_finds_a_lamp_that_no_photograph_sees() {
+/// How `preview` solves one room.
+fn previewed(family: Family, seed: u64) -> Row {
     let folder = tempfile::tempdir().expect("a folder");
     let plan = Plan {
-        families: vec![Family::Unseen],
+        families: vec![family],
         size: [96, 72],
-        ..plan(&[5], Preset::Preview)
+        ..plan(&[seed], Preset::Preview)
     };
     let mut solved = Vec::new();
     let heard = &mut |event: RoomEvent| {
@@ -446,9 +445,23 @@ fn preview_finds_a_lamp_that_no_photograph_sees() {
         }
     };
     run(folder.path(), &plan, &|| false, heard).expect("solved");
-    let [row] = solved.as_slice() else {
-        panic!("{} rooms", solved.len());
-    };
+    assert_eq!(solved.len(), 1);
+    solved.remove(0)
+}
+
+/// A piece of wall beside a window is saturated in all photographs. As a lamp it is given a hundred times the radiance that these
+/// show, and the factor of all albedos is 0.38.
+#[test]
+fn a_saturated_wall_beside_a_window_does_not_light_the_room() {
+    let row = previewed(Family::Scanned, 29);
+    let factor = row.albedo_factor.expect("albedos");
+    assert!((0.7..1.4).contains(&factor), "{factor}");
+}
+
+/// The light field takes other surfaces for the lamp: none of it is found, and albedos are off by 0.066.
+#[test]
+fn preview_finds_a_lamp_that_no_photograph_sees() {
+    let row = previewed(Family::Unseen, 5);
     assert_eq!(
         (row.lamps_true, row.lamps_found, row.lamps_false),
         (1, 1, 0)

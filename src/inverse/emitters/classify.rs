@@ -75,6 +75,15 @@ pub fn classify(cache: &PathCache, unknowns: &Unknowns, roles: &[Role]) -> Vec<C
         .collect()
 }
 
+/// The least emission of each surface that explains its photographs, where saturated ones are lower bounds; `None` for surfaces
+/// without photographs or whose role is settled otherwise.
+pub fn least_emission(cache: &PathCache, unknowns: &Unknowns, roles: &[Role]) -> Vec<Option<Vec3>> {
+    let least = |clusters: &Vec<OwnRadiance>| Some(RoleModels::new(clusters)?.emission.as_vec3());
+    (own_radiance(cache, unknowns, roles).iter())
+        .map(least)
+        .collect()
+}
+
 /// For each surface, its clusters' [`OwnRadiance`].
 fn own_radiance(cache: &PathCache, unknowns: &Unknowns, roles: &[Role]) -> Vec<Vec<OwnRadiance>> {
     let surfaces = unknowns.surfaces();
@@ -364,6 +373,9 @@ mod tests {
         assert_eq!(changes.len(), 1, "{changes:?}");
         assert_eq!((changes[0].object, changes[0].role), (1, Role::Emitter));
         assert!((changes[0].value - Vec3::ONE).length() < 1e-5);
+        let roles = [Role::Glowing, Role::Reflector];
+        let least = least_emission(&cache, &unknowns, &roles);
+        assert_eq!((least[0], least[1]), (None, Some(changes[0].value)));
         // An emitter brighter than its lower bounds stays one.
         unknowns = Unknowns::grey([0.6, 0.0], [0.0, 8.0]);
         let settled = classify(&cache, &unknowns, &[Role::Reflector, Role::Emitter]);

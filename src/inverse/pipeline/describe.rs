@@ -24,6 +24,7 @@ const WHITE: f32 = 0.01;
 
 const LAMP: &str = "its own light hides what it reflects; emission is all that leaves it";
 const LAMP_OF_FEW_PIXELS: &str = "its own light hides what it reflects; emission is all that leaves it; only a few pixels see it";
+const SATURATED: &str = "all photographs of it are saturated; its emission is the least that they show, and nothing tells that it is more";
 const UNSEEN: &str = "no photograph sees it; its emission is inferred from its effect on others";
 
 impl Pipeline<'_, '_> {
@@ -79,6 +80,10 @@ impl Pipeline<'_, '_> {
                 } else {
                     (true, LAMP)
                 }
+            }
+            Role::Saturated => {
+                object.albedo = Vec3::ZERO;
+                (false, SATURATED)
             }
             Role::Unseen => (false, UNSEEN),
             Role::Dark => (false, "no photograph sees it; its albedo is assumed"),

@@ -31,7 +31,8 @@ impl Pipeline<'_, '_> {
         free.extend(
             (0..objects)
                 .filter(|&k| {
-                    !self.roles[k].emits() && self.lobes.get(k).is_none_or(Option::is_none)
+                    let is_dark = !self.roles[k].emits() && self.roles[k] != Role::Saturated;
+                    is_dark && self.lobes.get(k).is_none_or(Option::is_none)
                 })
                 .map(|k| objects + k),
         );

@@ -20,7 +20,7 @@ const UNSEEN_AREA: f64 = 1e-3;
 impl Pipeline<'_, '_> {
     /// The free parameters. In the light field an unseen surface has one, its exitant radiance; full paths tell its albedo too.
     pub(super) fn free(&self) -> Vec<usize> {
-        let has_albedo = |k| self.roles[k] != Role::Emitter && self.has_free_albedo(k);
+        let has_albedo = |k: usize| !self.roles[k].is_lamp() && self.has_free_albedo(k);
         roles::free(&self.roles, has_albedo)
     }
 
@@ -102,7 +102,7 @@ impl Pipeline<'_, '_> {
     /// Sets the standard errors of fitted parameters. Fixed ones keep those of their score tests.
     pub(super) fn merge_errors(&mut self, errors: StandardErrors) {
         for (k, role) in self.roles.iter().enumerate() {
-            if *role != Role::Emitter && self.has_free_albedo(k) {
+            if !role.is_lamp() && self.has_free_albedo(k) {
                 self.errors.albedo[k] = errors.albedo[k];
             }
             if role.emits() {

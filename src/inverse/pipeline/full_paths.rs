@@ -41,8 +41,10 @@ impl Pipeline<'_, '_> {
         self.monitor.phase("fitting albedo and emission");
         // Roles are tested with even weights, since residuals under a wrong role are no measure of noise.
         self.robust = RobustWeights::even(self.roles.len());
+        self.free_saturated();
         let fitted = self.fit(&cache)?;
         self.settle_roles(&cache, fitted)?;
+        self.hold_saturated(&cache)?;
         Ok((cache, limit))
     }
 }

@@ -11,6 +11,7 @@ use crate::inverse::outside::MeasuredOutside;
 use crate::inverse::paths::PathCache;
 use crate::inverse::paths::clusters::mean_radiance;
 use crate::inverse::paths::evaluate::Linearised;
+use crate::inverse::pipeline::misfit::Misfit;
 use crate::inverse::pipeline::{Pipeline, Result};
 use crate::inverse::roles::{self, Role};
 use crate::inverse::unknowns::Unknowns;
@@ -25,8 +26,6 @@ const ESCAPING: f64 = 1e-3;
 const OUTSIDE_GAIN: f64 = 0.03;
 /// Greatest number of times that a sun's direction is refined.
 const REFINEMENTS: usize = 2;
-/// Standard errors by which the squared error falls.
-const FALL_ERRORS: f64 = 4.0;
 /// Standard errors by which a sun's light exceeds zero, as usual for one unknown: the squared error decides about its direction.
 const SUN_ERRORS: f32 = 3.0;
 
@@ -86,12 +85,21 @@ impl Pipeline<'_, '_> {
             self.light_through_windows(field)?
         };
         // The chosen light is fitted to as many paths as the light field.
-        if self.open && self.budget.trial_paths < self.budget.light_field_paths {
+        let mut held = Vec::new();
+        let has_more = self.budget.trial_paths < self.budget.light_field_paths;
+        if self.open && (has_more || scene.scanned) {
             let paths = self.paths_of(field, self.budget.light_field_paths)?;
             self.weigh(&paths)?;
+            held = self.hold_saturated(&paths)?;
         }
         self.describe();
-        let why = format!("{leave}; light from there {what}");
+        let mut why = format!("{leave}; light from there {what}");
+        if !held.is_empty() {
+            let names = held.join(", ");
+            why.push_str(&format!(
+                "; no more light than saturated photographs show is given to {names}, whose light the rest does not call for"
+            ));
+        }
         self.record("outside light", started, self.open, why)
     }
 
@@ -371,40 +379,5 @@ impl Pipeline<'_, '_> {
             fall -= square(&cluster);
         }
         if all > 0.0 { fall / all } else { 0.0 }
-    }
-}
-
-/// The squared relative error of the model for each cluster of the fit, at most one, and the cluster's pixels. It is measured
-/// across the two sets of paths, so that their noise adds nothing: sunlight that arrives after a bounce is much noisier than a lamp
-/// that is seen.
-struct Misfit(Vec<(f64, f64)>);
-
-impl Misfit {
-    fn new(cache: &PathCache, unknowns: &Unknowns) -> Self {
-        let of = |found: Linearised| {
-            let [a, b] = found.residuals;
-            let square = found.weight_now() * a * b / found.pixels;
-            let square = square.clamp(DVec3::NEG_ONE, DVec3::ONE).element_sum() / 3.0;
-            (square, found.pixels)
-        };
-        Self(cache.residuals(unknowns).into_iter().map(of).collect())
-    }
-
-    fn mean(&self) -> f64 {
-        let (sum, pixels) = (self.0.iter()).fold((0.0, 0.0), |(sum, all), (square, pixels)| {
-            (sum + square * pixels, all + pixels)
-        });
-        sum / f64::max(pixels, 1.0)
-    }
-
-    /// Whether the mean of `other` is less by more than `needed` and by more than the noise of the difference.
-    fn falls(&self, other: &Self, needed: f64) -> bool {
-        let fall = self.mean() - other.mean();
-        let (mut squares, mut pixels) = (0.0, 0.0);
-        for ((before, weight), (after, _)) in self.0.iter().zip(&other.0) {
-            squares += ((before - after - fall) * weight).powi(2);
-            pixels += weight;
-        }
-        fall > needed && fall > FALL_ERRORS * squares.sqrt() / f64::max(pixels, 1.0)
     }
 }

@@ -8,7 +8,6 @@ use crate::inverse::paths::memory::PILOT_CLUSTERS;
 use crate::inverse::paths::trace::{Tracer, max_mean_path_length};
 use crate::inverse::paths::{PathCache, memory};
 use crate::inverse::pipeline::{Pipeline, Result};
-use crate::inverse::roles::Role;
 use crate::transport::emitters::Emitters;
 use std::time::{Duration, Instant};
 
@@ -117,9 +116,9 @@ impl Pipeline<'_, '_> {
     fn expected_albedo(&self) -> Vec<f32> {
         let albedo = self.unknowns.albedo.iter().zip(&self.roles);
         albedo
-            .map(|(albedo, role)| match role {
-                Role::Emitter => ALBEDO_MEAN,
-                _ => albedo.max_element(),
+            .map(|(albedo, role)| match role.is_lamp() {
+                true => ALBEDO_MEAN,
+                false => albedo.max_element(),
             })
             .collect()
     }
