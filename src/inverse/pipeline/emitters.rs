@@ -76,13 +76,14 @@ impl Pipeline<'_, '_> {
     /// removes insignificant emission of unseen objects.
     pub(super) fn settle_roles(&mut self, cache: &PathCache, mut fitted: Fit) -> Result {
         self.take_values(&fitted);
+        let scanned = self.problem.scene.scanned;
         let mut was_emitter = vec![false; self.roles.len()];
         for _ in 0..MAX_CHANGES {
-            let mut changes = classify(cache, &self.unknowns, &self.roles);
+            let mut changes = classify(cache, &self.unknowns, &self.roles, scanned);
             // An object that became a reflector stays one, which ends oscillations.
             changes.retain(|change| !was_emitter[change.object]);
             leave_possible(&mut changes, &self.roles, &self.monitor.known);
-            if self.problem.scene.scanned {
+            if scanned {
                 leave_brightest(&mut changes);
             }
             if changes.is_empty() {
@@ -109,7 +110,8 @@ impl Pipeline<'_, '_> {
     }
 
     /// Adds emission to reflectors or dark objects: the one with the most significant score test is set free, refitted, and kept if
-    /// it stays significant. Returns the names of the added lamps.
+    /// it stays significant. Returns the names of the added lamps. The light on a scan's surfaces is too uncertain to tell emission
+    /// from albedo, so that its reflectors get none.
     ///
     /// The first rejection ends the search: less significant candidates are due to textures or highlights.
     pub(super) fn test_glow(&mut self, cache: &PathCache) -> Result<Vec<String>> {
@@ -120,7 +122,8 @@ impl Pipeline<'_, '_> {
             let tested = self.test_dark(cache);
             let open = |test: &ScoreTest| {
                 let k = test.index - objects;
-                k < in_mesh && !self.emission_is_known(k)
+                let can_emit = self.roles[k] == Role::Dark || !self.problem.scene.scanned;
+                k < in_mesh && can_emit && !self.emission_is_known(k)
             };
             let strongest = (tested.into_iter())
                 .filter(open)
