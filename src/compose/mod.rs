@@ -4,6 +4,7 @@ pub mod backdrop;
 pub mod denoise;
 pub mod first_look;
 pub mod insert;
+pub mod matte;
 pub mod naive;
 pub mod object;
 pub mod pick;

@@ -1,6 +1,7 @@
 //! Relights a photograph by the ratio of two renders (Marschner and Greenberg 1997), which keeps detail beyond the estimate.
 
 use crate::compose::backdrop::Backdrop;
+use crate::compose::matte::Matte;
 use crate::error::Result;
 use crate::gpu::{Tracer, View};
 use crate::math::picture::Picture;
@@ -51,9 +52,11 @@ pub struct Relighting {
     pairs: Vec<[Film; 2]>,
     next_row: u32,
     denoiser: Option<Denoiser>,
-    guides: Option<Guides>,
-    /// What the photograph's pixels see, if smaller renders were enlarged to its size.
+    guides: OnceLock<Guides>,
+    /// What the photograph's pixels see, if that was asked for.
     guides_at_centers: Arc<OnceLock<Guides>>,
+    /// The edges of recoloured surfaces of a scan.
+    matte: Arc<OnceLock<Option<Matte>>>,
 }
 
 impl Relighting {
@@ -74,8 +77,9 @@ impl Relighting {
             seed,
             next_row: 0,
             denoiser,
-            guides: None,
+            guides: OnceLock::new(),
             guides_at_centers: Arc::default(),
+            matte: Arc::default(),
         }
     }
 
@@ -88,8 +92,9 @@ impl Relighting {
             backdrop: self.backdrop.clone(),
             lights: self.lights.clone(),
             next_row: 0,
-            guides: None,
+            guides: OnceLock::new(),
             guides_at_centers: self.guides_at_centers.clone(),
+            matte: self.matte.clone(),
             ..*self
         }
     }
@@ -171,13 +176,43 @@ impl Relighting {
     }
 
     /// The relit photograph from the samples so far; call it only between passes.
-    pub fn photograph(&mut self) -> Picture {
-        let [before, after] = self.renders();
+    pub fn photograph(&self) -> Picture {
+        let [before, mut after] = self.renders();
+        if let Some(matte) = self.matte() {
+            after.pixels = matte.applied(&before.pixels, &after.pixels);
+        }
         relit(&self.backdrop, &before.pixels, &after.pixels)
     }
 
+    /// The matte of recoloured surfaces, if the mesh is a scan's; other meshes have edges where the photograph has them.
+    fn matte(&self) -> Option<&Matte> {
+        if !self.lights[0].scene.scanned {
+            return None;
+        }
+        let matte = || {
+            let Backdrop {
+                photograph,
+                shown_at,
+                ..
+            } = &self.backdrop;
+            let shown: Vec<Vec3> = photograph.pixels.iter().map(|&p| p * *shown_at).collect();
+            let shape = [photograph.width, photograph.height].map(|side| side as usize);
+            let [before, after] = self.guides_at_centers();
+            Matte::new(&shown, shape, before, after)
+        };
+        self.matte.get_or_init(matte).as_ref()
+    }
+
+    /// What the photograph's pixels see at their centres.
+    fn guides_at_centers(&self) -> &Guides {
+        self.guides_at_centers.get_or_init(|| {
+            let lights = self.lights.each_ref();
+            lights.map(|lit| guides_at_centers(&**lit, &self.backdrop.camera))
+        })
+    }
+
     /// Renders in both lights at the photograph's size, denoised if there are two pairs.
-    fn renders(&mut self) -> [Picture; 2] {
+    fn renders(&self) -> [Picture; 2] {
         let size = |camera: &Camera| [camera.intrinsics.width, camera.intrinsics.height];
         let whole = &self.backdrop.camera;
         let is_small = size(&self.camera) != size(whole);
@@ -186,7 +221,7 @@ impl Relighting {
         }
         let lights = self.lights.each_ref();
         let seen = || lights.map(|lit| guides(&**lit, &self.camera));
-        let guides = self.guides.get_or_insert_with(seen);
+        let guides = self.guides.get_or_init(seen);
         let render = |light: usize| match (&self.pairs[..], self.denoiser) {
             ([first, second], Some(denoiser)) => denoiser.denoise(
                 &first[light].picture(),
@@ -199,8 +234,7 @@ impl Relighting {
         if !is_small {
             return renders;
         }
-        let seen = || lights.map(|lit| guides_at_centers(&**lit, whole));
-        let at_centers = self.guides_at_centers.get_or_init(seen);
+        let at_centers = self.guides_at_centers();
         [0, 1].map(|i| upsample(&renders[i], &guides[i], size(whole), &at_centers[i]))
     }
 }

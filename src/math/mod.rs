@@ -1,6 +1,7 @@
 //! Colour, frames, matrices, sampling and statistics, independent of any scene.
 
 pub mod blur;
+pub mod box_mean;
 pub mod cholesky;
 pub mod color;
 pub mod cumulative;
