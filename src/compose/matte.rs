@@ -12,12 +12,13 @@ use std::collections::BTreeMap;
 const RADIUS: f32 = 0.02;
 /// Variance of the photograph's sRGB values, from 0 to 1, below which differences tell nothing: that of noise of 3 %.
 const NOISE: f32 = 1e-3;
-/// The filter softens a sharp edge over its windows. Mattes between these values are stretched to 0 to 1.
+/// Mattes between these values are stretched to 0 to 1. Where colours explain a fraction f of a mask's variance, the fit is on average
+/// (1 - f) / 2 beside a straight edge and (1 + f) / 2 within: with 0.6 and more both sides come out whole.
 const SOFT: [f32; 2] = [0.2, 0.8];
-/// Fraction of the variance of a mask that the photograph's colours have to explain: below the first value the edge stays as it is in
-/// the mesh, above the second it is taken from the photograph.
+/// Fraction of a mask's variance that the photograph's colours have to explain. With less than the first value, both sides of an edge
+/// differ by a tenth at most, and the matte would be a blur: the edge stays as it is in the mesh. Above the second it is taken from the
+/// photograph.
 const EXPLAINED: [f32; 2] = [0.1, 0.3];
-
 /// Ratio of new to old albedo below which a surface is black.
 const MIN_CHANGE: f32 = 1e-3;
 
@@ -30,7 +31,7 @@ pub struct Matte {
     in_photograph: Vec<Vec3>,
     /// Whether the pixel lies at an edge of the mesh, so that its render mixes both sides, and the photograph's edge counts.
     is_mixed: Vec<bool>,
-    shape: [usize; 2],
+    windows: Windows,
 }
 
 impl Matte {
@@ -56,15 +57,15 @@ impl Matte {
         if masks.is_empty() {
             return None;
         }
-        let filter = GuidedFilter::new(shown, shape);
-        let window = 2 * radius(shape) + 1;
-        let one_pixel = 1.0 / (window * window) as f32;
+        let windows = Windows::of(shape);
+        let filter = GuidedFilter::new(shown, windows);
+        let one_pixel = windows.one_pixel();
         let mut in_photograph = vec![Vec3::ONE; in_mesh.len()];
         let mut is_mixed = vec![false; in_mesh.len()];
         for mask in masks.values() {
             let (matte, trust) = filter.matte(mask);
-            let covered = filter.mean(mask);
-            let change = filter.means(|pixel| in_mesh[pixel] * mask[pixel]);
+            let covered = windows.mean(mask);
+            let change = windows.means(|pixel| in_mesh[pixel] * mask[pixel]);
             let neighbours = box_mean(mask, shape, 1);
             for pixel in 0..mask.len() {
                 // Beside the mask its mean change counts, as far as the windows reach.
@@ -82,7 +83,7 @@ impl Matte {
             in_mesh,
             in_photograph: in_photograph.iter().map(|c| c.max(Vec3::ZERO)).collect(),
             is_mixed,
-            shape,
+            windows,
         })
     }
 
@@ -96,13 +97,11 @@ impl Matte {
             Vec3::select(tells, after[pixel] / change, before[pixel])
         };
         let is_known = |pixel: usize| !self.is_mixed[pixel] && light(pixel).is_finite();
-        let known = |value: &dyn Fn(usize) -> Vec3| -> Vec<Vec3> {
-            let value = |pixel: usize| match is_known(pixel) {
+        let known = |value: &(dyn Fn(usize) -> Vec3 + Sync)| {
+            self.windows.means(|pixel| match is_known(pixel) {
                 true => value(pixel),
                 false => Vec3::ZERO,
-            };
-            let values: Vec<Vec3> = (0..before.len()).map(value).collect();
-            means(&values, self.shape)
+            })
         };
         let [dark, lit] = [known(&|pixel| before[pixel]), known(&light)];
         (0..before.len())
@@ -134,25 +133,50 @@ fn changed_albedo((before, after): (&Option<Guide>, &Option<Guide>)) -> Vec3 {
     }
 }
 
-fn radius(shape: [usize; 2]) -> usize {
-    let long_side = shape[0].max(shape[1]) as f32;
-    (RADIUS * long_side).ceil() as usize
+/// The filter's windows around the pixels of a picture.
+#[derive(Debug, Clone, Copy)]
+struct Windows {
+    shape: [usize; 2],
+    radius: usize,
 }
 
-/// Means of colours over the filter's windows.
-fn means(values: &[Vec3], shape: [usize; 2]) -> Vec<Vec3> {
-    let channel = |c: usize| -> Vec<f32> {
-        let values: Vec<f32> = values.iter().map(|v| v[c]).collect();
-        box_mean(&values, shape, radius(shape))
-    };
-    let [r, g, b] = [0, 1, 2].map(channel);
-    let colors = r.into_iter().zip(g).zip(b);
-    colors.map(|((r, g), b)| Vec3::new(r, g, b)).collect()
+impl Windows {
+    fn of(shape: [usize; 2]) -> Self {
+        let long_side = shape[0].max(shape[1]) as f32;
+        let radius = (RADIUS * long_side).ceil() as usize;
+        Self { shape, radius }
+    }
+
+    /// The fraction of a window that one pixel is.
+    fn one_pixel(self) -> f32 {
+        let side = 2 * self.radius + 1;
+        1.0 / (side * side) as f32
+    }
+
+    /// Means of numbers over the window of each pixel.
+    fn mean(self, values: &[f32]) -> Vec<f32> {
+        box_mean(values, self.shape, self.radius)
+    }
+
+    /// Means of colours over the window of each pixel.
+    fn means(self, value: impl Fn(usize) -> Vec3 + Sync + Send) -> Vec<Vec3> {
+        let values = each(self.shape[0] * self.shape[1], value);
+        let [r, g, b] =
+            [0, 1, 2].map(|channel| self.mean(&each(values.len(), |pixel| values[pixel][channel])));
+        each(values.len(), |pixel| {
+            Vec3::new(r[pixel], g[pixel], b[pixel])
+        })
+    }
+}
+
+/// A value for each of some pixels, in parallel.
+fn each<T: Send>(pixels: usize, value: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+    (0..pixels).into_par_iter().map(value).collect()
 }
 
 /// A guided filter: the means and covariances of the photograph's colours in the window of each pixel.
 struct GuidedFilter {
-    shape: [usize; 2],
+    windows: Windows,
     colors: Vec<Vec3>,
     mean: Vec<Vec3>,
     /// Inverse of the covariance with [`NOISE`] added.
@@ -160,76 +184,58 @@ struct GuidedFilter {
 }
 
 impl GuidedFilter {
-    fn new(shown: &[Vec3], shape: [usize; 2]) -> Self {
+    fn new(shown: &[Vec3], windows: Windows) -> Self {
         let encoded = |v: f32| linear_to_srgb(v.clamp(0.0, 1.0));
-        let colors: Vec<Vec3> = shown.iter().map(|c| c.map(encoded)).collect();
-        let mean = means(&colors, shape);
-        let [squares, products] = [|c: Vec3| c * c, |c: Vec3| c * Vec3::new(c.y, c.z, c.x)]
-            .map(|of| means(&colors.iter().map(|&c| of(c)).collect::<Vec<_>>(), shape));
-        let inverse = (mean.par_iter().zip(&squares).zip(&products))
-            .map(|((&m, &squares), &products)| {
-                let variance = squares - m * m + Vec3::splat(NOISE);
-                let Vec3 {
-                    x: rg,
-                    y: gb,
-                    z: br,
-                } = products - m * Vec3::new(m.y, m.z, m.x);
-                Mat3::from_cols(
-                    Vec3::new(variance.x, rg, br),
-                    Vec3::new(rg, variance.y, gb),
-                    Vec3::new(br, gb, variance.z),
-                )
-                .inverse()
-            })
-            .collect();
+        let colors = each(shown.len(), |pixel| shown[pixel].map(encoded));
+        let turned = |c: Vec3| Vec3::new(c.y, c.z, c.x);
+        let mean = windows.means(|pixel| colors[pixel]);
+        let squares = windows.means(|pixel| colors[pixel] * colors[pixel]);
+        let products = windows.means(|pixel| colors[pixel] * turned(colors[pixel]));
+        let inverse = each(colors.len(), |pixel| {
+            let m = mean[pixel];
+            let variance = squares[pixel] - m * m + Vec3::splat(NOISE);
+            let [rg, gb, br] = (products[pixel] - m * turned(m)).to_array();
+            Mat3::from_cols(
+                Vec3::new(variance.x, rg, br),
+                Vec3::new(rg, variance.y, gb),
+                Vec3::new(br, gb, variance.z),
+            )
+            .inverse()
+        });
         Self {
-            shape,
+            windows,
             colors,
             mean,
             inverse,
         }
     }
 
-    fn mean(&self, values: &[f32]) -> Vec<f32> {
-        box_mean(values, self.shape, radius(self.shape))
-    }
-
-    fn means(&self, value: impl Fn(usize) -> Vec3) -> Vec<Vec3> {
-        means(
-            &(0..self.colors.len()).map(value).collect::<Vec<_>>(),
-            self.shape,
-        )
-    }
-
     /// The matte of a mask with values 0 and 1: the fraction of each pixel that belongs to it by the photograph's colours, and the
     /// mask itself where these tell nothing. Also returns how much the colours count, 0 to 1.
     fn matte(&self, mask: &[f32]) -> (Vec<f32>, Vec<f32>) {
-        let share = self.mean(mask);
-        let covariance = self.means(|pixel| self.colors[pixel] * mask[pixel]);
-        let covariance: Vec<Vec3> = (0..mask.len())
-            .map(|pixel| covariance[pixel] - self.mean[pixel] * share[pixel])
-            .collect();
-        let slope: Vec<Vec3> = (0..mask.len())
-            .map(|pixel| self.inverse[pixel] * covariance[pixel])
-            .collect();
-        let offset: Vec<f32> = (0..mask.len())
-            .map(|pixel| share[pixel] - slope[pixel].dot(self.mean[pixel]))
-            .collect();
-        let explained: Vec<f32> = (0..mask.len())
-            .map(|pixel| slope[pixel].dot(covariance[pixel]))
-            .collect();
-        let variance: Vec<f32> = share.iter().map(|share| share * (1.0 - share)).collect();
-        let slope = self.means(|pixel| slope[pixel]);
-        let [offset, explained, variance] = [offset, explained, variance].map(|v| self.mean(&v));
-        (0..mask.len())
+        let pixels = mask.len();
+        // In each window, the mask as a linear function of colour, and how much of its variance that explains.
+        let share = self.windows.mean(mask);
+        let products = self.windows.means(|pixel| self.colors[pixel] * mask[pixel]);
+        let covariance = |pixel: usize| products[pixel] - self.mean[pixel] * share[pixel];
+        let slope = each(pixels, |pixel| self.inverse[pixel] * covariance(pixel));
+        let offset = each(pixels, |pixel| {
+            share[pixel] - slope[pixel].dot(self.mean[pixel])
+        });
+        let explained = each(pixels, |pixel| slope[pixel].dot(covariance(pixel)));
+        let variance = each(pixels, |pixel| share[pixel] * (1.0 - share[pixel]));
+
+        // Each pixel takes the mean over the windows that it is in.
+        let slope = self.windows.means(|pixel| slope[pixel]);
+        let [offset, explained, variance] =
+            [offset, explained, variance].map(|values| self.windows.mean(&values));
+        (0..pixels)
             .map(|pixel| {
                 let fitted = slope[pixel].dot(self.colors[pixel]) + offset[pixel];
                 let explained = explained[pixel] / variance[pixel].max(f32::MIN_POSITIVE);
                 let trust = ramp(explained, EXPLAINED);
-                (
-                    mask[pixel] + (ramp(fitted, SOFT) - mask[pixel]) * trust,
-                    trust,
-                )
+                let mask = mask[pixel];
+                (mask + (ramp(fitted, SOFT) - mask) * trust, trust)
             })
             .unzip()
     }
@@ -302,7 +308,7 @@ mod tests {
             from_photograph < 0.05 * from_mesh,
             "{from_photograph}, {from_mesh}"
         );
-        // Far from the edge nothing changes, to the bit.
+        // Far from the edge nothing changes.
         assert!(ratios[40].abs_diff_eq(RED, 1e-6) && ratios[390] == Vec3::ONE);
     }
 

@@ -186,7 +186,9 @@ impl Relighting {
 
     /// The matte of recoloured surfaces, if the mesh is a scan's; other meshes have edges where the photograph has them.
     fn matte(&self) -> Option<&Matte> {
-        if !self.lights[0].scene.scanned {
+        let [before, after] = &self.lights;
+        let mut materials = before.materials.iter().zip(&after.materials);
+        if !before.scene.scanned || materials.all(|(a, b)| a.albedo.is_same(&b.albedo)) {
             return None;
         }
         let matte = || {

@@ -7,8 +7,29 @@ use rayon::prelude::*;
 pub fn box_mean(values: &[f32], shape: [usize; 2], radius: usize) -> Vec<f32> {
     let [width, height] = shape;
     let rows = along_rows(values, width, radius);
-    let columns = along_rows(&transposed(&rows, width), height, radius);
-    transposed(&columns, height)
+    // Sums over the rows of the window, for all columns at once.
+    let mut sums = vec![0.0; width];
+    let add = |sums: &mut [f64], y: usize, sign: f64| {
+        let row = &rows[y * width..(y + 1) * width];
+        for (sum, value) in sums.iter_mut().zip(row) {
+            *sum += sign * f64::from(*value);
+        }
+    };
+    for y in 0..radius.min(height) {
+        add(&mut sums, y, 1.0);
+    }
+    let mut means = Vec::with_capacity(rows.len());
+    for y in 0..height {
+        if y + radius < height {
+            add(&mut sums, y + radius, 1.0);
+        }
+        if y > radius {
+            add(&mut sums, y - radius - 1, -1.0);
+        }
+        let count = (y + radius + 1).min(height) - y.saturating_sub(radius);
+        means.extend(sums.iter().map(|sum| (sum / count as f64) as f32));
+    }
+    means
 }
 
 /// Means over `2 radius + 1` pixels of each row of `width`.
@@ -29,13 +50,6 @@ fn along_rows(values: &[f32], width: usize, radius: usize) -> Vec<f32> {
         }
     });
     means
-}
-
-/// A picture of `width` with its rows as columns.
-fn transposed(values: &[f32], width: usize) -> Vec<f32> {
-    let height = values.len() / width.max(1);
-    let pixel = |i: usize| values[(i % height) * width + i / height];
-    (0..values.len()).into_par_iter().map(pixel).collect()
 }
 
 #[cfg(test)]

@@ -19,6 +19,18 @@ pub enum Albedo {
     Image(Arc<Texture>, Vec3),
 }
 
+impl Albedo {
+    /// Whether two albedos are plainly the same: one colour, or the same texels or image in memory.
+    pub fn is_same(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Constant(a), Self::Constant(b)) => a == b,
+            (Self::Texels(a), Self::Texels(b)) => Arc::ptr_eq(a, b),
+            (Self::Image(a, by_a), Self::Image(b, by_b)) => Arc::ptr_eq(a, b) && by_a == by_b,
+            _ => false,
+        }
+    }
+}
+
 /// Colours on a [`TexelLayout`].
 #[derive(Debug, Clone)]
 pub struct TexelColors {
