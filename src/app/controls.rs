@@ -1,5 +1,6 @@
 //! Controls that several panes share, each with a name for those who do not see it, and what is chosen from lists.
 
+use egui::emath::Numeric;
 use egui::{Button, ComboBox, DragValue, Key, Response, Role, TextEdit, Ui, Widget, WidgetInfo};
 use glam::{DVec3, Vec3};
 
@@ -21,14 +22,40 @@ pub fn labelled(ui: &mut Ui, label: &str, control: impl Widget) -> Response {
     ui.add(control).labelled_by(label.id)
 }
 
+/// A number that is dragged or typed, with a name that is read out and a help; true when changed.
+///
+/// A field that is left with the text it had keeps what its `decimals` do not show.
+pub fn number_field<T: Numeric>(
+    ui: &mut Ui,
+    [name, help]: [&str; 2],
+    value: &mut T,
+    decimals: usize,
+    shape: impl FnOnce(DragValue<'_>) -> DragValue<'_>,
+) -> bool {
+    let before = *value;
+    let drag = DragValue::new(value).max_decimals(decimals);
+    let response = ui.add(shape(drag));
+    let response = match help {
+        "" => response,
+        help => response.on_hover_text(help),
+    };
+    let response = named(response, Role::SpinButton, name);
+    let rounding = 0.5 * 10f64.powi(-(decimals as i32));
+    if response.lost_focus() && (value.to_f64() - before.to_f64()).abs() <= rounding {
+        *value = before;
+        return false;
+    }
+    response.changed()
+}
+
 /// Three numbers for a point of the capture, of which one is dragged by `speed` a point of the screen; true when changed.
 pub fn point(ui: &mut Ui, name: &str, at: &mut DVec3, speed: f64) -> bool {
     let mut changed = false;
     for (axis, value) in ["x", "y", "z"].into_iter().zip(at.as_mut()) {
-        let drag = DragValue::new(value).speed(speed).max_decimals(3);
-        let response = ui.add(drag.prefix(format!("{axis} ")));
         let name = format!("{name} {axis}");
-        changed |= named(response, Role::SpinButton, &name).changed();
+        changed |= number_field(ui, [&name, ""], value, 3, |drag| {
+            drag.speed(speed).prefix(format!("{axis} "))
+        });
     }
     changed
 }

@@ -8,6 +8,7 @@ pub mod compare;
 pub mod exr;
 pub mod falsecolor;
 pub mod glb;
+pub mod heading;
 pub mod import;
 pub mod light_layers;
 pub mod mitsuba;

@@ -2,11 +2,12 @@
 
 use crate::error::Result;
 use crate::export::canvas::{DrawError, FONT, PlotArea, write_plot};
+use crate::export::heading::draw_heading;
 use crate::export::scale::Scale;
 use crate::inverse::solver::{LossPoint, Progress, Stage};
 use plotters::prelude::{
     BLACK, ChartBuilder, Circle, Color, EmptyElement, IntoFont, LineSeries, PathElement, Polygon,
-    RGBColor, Rectangle, SeriesLabelPosition, Text, WHITE,
+    RGBColor, Text, WHITE,
 };
 use plotters::style::TextStyle;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -87,8 +88,13 @@ fn row_for(rows: &mut Vec<i32>, left: i32, name: &str) -> i32 {
         rows.push(0);
         rows.len() - 1
     });
-    rows[row] = left + LETTER * (name.chars().count() as i32 + 2);
+    rows[row] = left + width_of(name);
     row as i32
+}
+
+/// Width of a mark's name with a gap, in pixels.
+fn width_of(name: &str) -> i32 {
+    LETTER * (name.chars().count() as i32 + 2)
 }
 
 impl Plot {
@@ -110,8 +116,20 @@ impl Plot {
         let y_scale = Scale::around(ys.filter(|&v| self.y.shows(v)), self.y.logarithmic);
         let (bottom, top) = (y_scale.low(), y_scale.high());
 
-        let mut chart = ChartBuilder::on(area)
-            .caption(&self.title, (FONT, 24))
+        let curves = self.series.iter().zip(COLORS.into_iter().cycle());
+        let curves: Vec<(&Series, RGBColor)> = curves
+            .map(|(series, color)| match series.draw {
+                Draw::Steps => (series, BLACK),
+                Draw::Line | Draw::Dots => (series, color),
+            })
+            .collect();
+        let named = curves.iter().filter(|(series, _)| !series.name.is_empty());
+        let named: Vec<_> = named
+            .map(|(series, color)| (&*series.name, *color))
+            .collect();
+        let height = draw_heading(area, &self.title, &named)?;
+
+        let mut chart = ChartBuilder::on(&area.split_vertically(height).1)
             .margin(14)
             .x_label_area_size(48)
             .y_label_area_size(80)
@@ -132,14 +150,20 @@ impl Plot {
             let line = vec![(*x, bottom), (*x, top)];
             chart.draw_series([PathElement::new(line, RGBColor(150, 150, 150))])?;
             let (left, _) = chart.backend_coord(&(*x, top));
-            let row = row_for(&mut rows, left, name);
-            let style = (FONT, 14).into_font().color(&RGBColor(110, 110, 110));
-            let text = Text::new(format!(" {name}"), (0, 16 * row), style);
+            // Near the right edge, the name lies to the left of its line.
+            let (text, start, side) = match left + width_of(name) > SIZE.0 as i32 {
+                true => (format!("{name} "), left - width_of(name), HPos::Right),
+                false => (format!(" {name}"), left, HPos::Left),
+            };
+            let row = row_for(&mut rows, start, name);
+            let style = TextStyle::from((FONT, 14).into_font()).color(&RGBColor(110, 110, 110));
+            let style = style.pos(Pos::new(side, VPos::Top));
+            let text = Text::new(text, (0, 16 * row), style);
             chart.draw_series([EmptyElement::at((*x, top)) + text])?;
         }
 
         // Bands, curves, and dots.
-        for (series, color) in self.series.iter().zip(COLORS.iter().cycle()) {
+        for (series, color) in curves {
             let banded = series.points.iter().zip(&series.band);
             let (lower, upper): (Vec<_>, Vec<_>) = banded
                 .filter(|(p, band)| shown(p) && band.iter().all(|&v| self.y.shows(v)))
@@ -151,23 +175,18 @@ impl Plot {
             }
             let points = series.points.iter().filter(|p| shown(p));
             let points: Vec<(f64, f64)> = points.map(|p| (p[0], p[1])).collect();
-            // Colour, radius of the dots, points and width of the line.
-            let (color, radius, line, width) = match series.draw {
-                Draw::Line if points.len() <= 40 => (*color, 4, points.clone(), 2),
-                Draw::Line => (*color, 0, points.clone(), 2),
-                Draw::Dots => (*color, 2, Vec::new(), 2),
-                Draw::Steps => (BLACK, 0, steps(&points), 1),
+            // Radius of the dots, points and width of the line.
+            let (radius, line, width) = match series.draw {
+                Draw::Line if points.len() <= 40 => (4, points.clone(), 2),
+                Draw::Line => (0, points.clone(), 2),
+                Draw::Dots => (2, Vec::new(), 2),
+                Draw::Steps => (0, steps(&points), 1),
             };
             if radius > 0 {
                 let dot = |&p: &(f64, f64)| Circle::new(p, radius, color.filled());
                 chart.draw_series(points.iter().map(dot))?;
             }
-            chart
-                .draw_series(LineSeries::new(line, color.stroke_width(width)))?
-                .label(&series.name)
-                .legend(move |(x, y)| {
-                    Rectangle::new([(x, y - 2), (x + 18, y + 2)], color.filled())
-                });
+            chart.draw_series(LineSeries::new(line, color.stroke_width(width)))?;
         }
         for (point, name) in self.labels.iter().filter(|(point, _)| shown(point)) {
             let at = (point[0], point[1]);
@@ -181,16 +200,6 @@ impl Plot {
             let style = TextStyle::from((FONT, 17).into_font()).color(&BLACK);
             let style = style.pos(Pos::new(side, VPos::Top));
             chart.draw_series([Text::new(text, at, style)])?;
-        }
-        if !self.series.is_empty() {
-            chart
-                .configure_series_labels()
-                .position(SeriesLabelPosition::UpperRight)
-                .background_style(WHITE.mix(0.85))
-                .border_style(BLACK.mix(0.2))
-                .label_font((FONT, 16))
-                .margin(8)
-                .draw()?;
         }
         Ok(())
     }

@@ -113,6 +113,32 @@ pub fn upper_median(values: &mut [f32]) -> Option<f32> {
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
 
+/// Pearson's test of counts against the expected ones, as a normal deviate: 3.72 is as rare as one in 10⁴, 4.27 as one in 10⁵.
+///
+/// Cells that expect fewer than `min` are pooled; where the pool does so too and yet holds six standard errors more, the result is
+/// infinite. ∛(χ²/k) of k degrees of freedom is nearly normal with mean 1 − 2/9k and variance 2/9k (Wilson and Hilferty 1931).
+pub fn pearson_deviate(observed: &[f64], expected: &[f64], min: f64) -> f64 {
+    let square = |o: f64, e: f64| (o - e).powi(2) / e;
+    let (mut squares, mut cells, mut pool) = (0.0, 0.0, (0.0, 0.0));
+    for (&o, &e) in observed.iter().zip(expected) {
+        if e < min {
+            pool = (pool.0 + o, pool.1 + e);
+        } else {
+            squares += square(o, e);
+            cells += 1.0;
+        }
+    }
+    if pool.1 > min {
+        squares += square(pool.0, pool.1);
+        cells += 1.0;
+    } else if pool.0 > min + 6.0 * min.sqrt() {
+        return f64::INFINITY;
+    }
+    let freedom = cells - 1.0;
+    let variance = 2.0 / (9.0 * freedom);
+    ((squares / freedom).cbrt() - (1.0 - variance)) / variance.sqrt()
+}
+
 /// Pearson's chi-square of counts in cells of equal probability.
 #[cfg(test)]
 pub(super) fn chi_square(cells: &[u32]) -> f64 {
@@ -132,6 +158,26 @@ mod tests {
         let kept = without_outliers(&values);
         assert_eq!(kept[..100], values[..100]);
         assert_eq!(kept[100..], [2.5, -2.5]);
+    }
+
+    #[test]
+    fn deviates_are_those_of_tabled_chi_squares() {
+        // Of 10 and 200 degrees of freedom, χ² is above 29.588 and 267.54 once in 10³: 3.090 of a normal.
+        for (freedom, tabled) in [(10usize, 29.588), (200, 267.541)] {
+            let expected = vec![100.0; freedom + 1];
+            let mut observed = expected.clone();
+            observed[0] += (tabled * 100.0f64).sqrt();
+            let found = pearson_deviate(&observed, &expected, 5.0);
+            assert!((found - 3.090).abs() < 0.02, "{freedom}: {found}");
+        }
+        // Pooled: three cells of 3 hold what one of 9 does, and a cell that expects nothing may hold little.
+        let pooled = |last: [f64; 3]| {
+            let observed = [&[100.0, 100.0][..], &last].concat();
+            pearson_deviate(&observed, &[100.0, 100.0, 3.0, 3.0, 3.0], 5.0)
+        };
+        assert_eq!(pooled([9.0, 0.0, 0.0]), pooled([3.0, 3.0, 3.0]));
+        let lost = |last| pearson_deviate(&[100.0, 100.0, last], &[100.0, 100.0, 0.0], 5.0);
+        assert!(lost(18.0).is_finite() && lost(19.0).is_infinite());
     }
 
     #[test]

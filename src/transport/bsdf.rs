@@ -171,7 +171,7 @@ fn alpha(lobe: &Lobe) -> f64 {
 mod tests {
     use super::*;
     use crate::math::rng::Stream;
-    use statrs::distribution::{ChiSquared, ContinuousCDF};
+    use crate::math::stats::pearson_deviate;
     use std::f64::consts::PI;
 
     fn direction(cos_theta: f32, phi: f32) -> Vec3 {
@@ -187,7 +187,7 @@ mod tests {
     }
 
     /// Pearson's test of `sample` against `pdf` over 10 × 20 cells of equal solid angle, one for lost samples.
-    fn p_value(bsdf: &Bsdf, wo: Vec3, seed: u64) -> f64 {
+    fn deviate(bsdf: &Bsdf, wo: Vec3, seed: u64) -> f64 {
         const ROWS: usize = 10;
         const COLUMNS: usize = 20;
         const FINE: usize = 48;
@@ -217,23 +217,7 @@ mod tests {
         let integral = expected.iter().sum::<f64>() / f64::from(n);
         assert!(integral < 1.0 + 2e-3, "{integral}");
         expected[ROWS * COLUMNS] = f64::from(n) * (1.0 - integral).max(0.0);
-        // Cells that expect fewer than five samples are pooled.
-        let (mut chi2, mut cells, mut rare) = (0.0, 0, (0.0, 0.0));
-        for (o, e) in observed.iter().zip(&expected) {
-            if *e < 5.0 {
-                rare = (rare.0 + o, rare.1 + e);
-            } else {
-                chi2 += (o - e).powi(2) / e;
-                cells += 1;
-            }
-        }
-        if rare.1 > 5.0 {
-            chi2 += (rare.0 - rare.1).powi(2) / rare.1;
-            cells += 1;
-        } else {
-            assert!(rare.0 < 25.0, "{} samples where none are expected", rare.0);
-        }
-        ChiSquared::new(f64::from(cells - 1)).map_or(0.0, |d| 1.0 - d.cdf(chi2))
+        pearson_deviate(&observed, &expected, 5.0)
     }
 
     #[test]
@@ -265,8 +249,9 @@ mod tests {
                 if cos_theta < 0.01 && bsdf.lobe.is_some_and(|lobe| lobe.roughness < 0.2) {
                     continue;
                 }
-                let p = p_value(&bsdf, wo, seed);
-                assert!(p > 1e-4, "p = {p} at cos {cos_theta} for {bsdf:?}");
+                // One in 10⁴.
+                let z = deviate(&bsdf, wo, seed);
+                assert!(z < 3.72, "z = {z} at cos {cos_theta} for {bsdf:?}");
             }
         }
     }

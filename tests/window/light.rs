@@ -174,6 +174,36 @@ fn a_wall_is_recoloured_taken_back_and_reset() {
 }
 
 #[test]
+fn a_field_that_is_left_with_the_text_it_had_changes_nothing() {
+    let (mut harness, recorder) = solving(Harness::builder());
+    recorder.show(|snapshot| {
+        let wall = &mut Arc::make_mut(&mut snapshot.estimate).objects[1];
+        wall.albedo = Vec3::new(0.70004, 0.12345, 0.33333);
+    });
+    click(&mut harness, "Select wall");
+    press(&mut harness, Modifiers::NONE, Key::M);
+    for label in [
+        "Albedo red",
+        "Albedo green",
+        "Albedo blue",
+        "Emission strength",
+    ] {
+        let field = harness.get_by_role_and_label(Role::SpinButton, label);
+        field.click();
+        harness.run_steps(3);
+    }
+    press(&mut harness, Modifiers::NONE, Key::Enter);
+    assert!(edits(&recorder.sent()).is_none());
+    // Of three channels, only the typed one changes.
+    type_value(&mut harness, "Albedo green", "0.2");
+    let sent = edits(&recorder.sent()).expect("sent");
+    assert_eq!(
+        sent.object(1).albedo,
+        Some(Vec3::new(0.70004, 0.2, 0.33333))
+    );
+}
+
+#[test]
 fn a_wall_is_given_gloss_polished_made_dull_and_taken_back() {
     let (mut harness, recorder) = solving(Harness::builder());
     click(&mut harness, "Select wall");

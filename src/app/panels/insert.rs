@@ -1,7 +1,7 @@
 //! Putting objects into the photographs: adding, placing, moving, turning, scaling, and the two results.
 
 use crate::app::action::Action;
-use crate::app::controls::{color_button, named, path_field, point, switched};
+use crate::app::controls::{color_button, number_field, path_field, point, switched};
 use crate::app::insertion::handles::SCALES;
 use crate::app::insertion::{Adding, Insertions, name};
 use crate::app::request::{Request, Requests};
@@ -11,7 +11,7 @@ use crate::app::view::Parts;
 use crate::compose::object::surface::MaterialOverride;
 use crate::compose::placement::Placement;
 use crate::scene::Scene;
-use egui::{Button, Checkbox, DragValue, Grid, Role, Ui};
+use egui::{Button, Checkbox, Grid, Role, Ui};
 use glam::DVec3;
 use std::path::PathBuf;
 
@@ -147,17 +147,18 @@ fn edit(ui: &mut Ui, object: &mut Placement, diameter: f64) {
         ui.label("Scale")
             .on_hover_text("Factor on the file's size; 0.01 for files in centimetres");
         let speed = object.scale.abs() * 0.01;
-        let scale = DragValue::new(&mut object.scale);
-        let scale = scale.range(SCALES.0..=SCALES.1).speed(speed).suffix(" ×");
-        named(ui.add(scale.max_decimals(4)), Role::SpinButton, "Scale");
+        number_field(ui, ["Scale", ""], &mut object.scale, 4, |drag| {
+            drag.range(SCALES.0..=SCALES.1).speed(speed).suffix(" ×")
+        });
         ui.end_row();
     });
 }
 
 fn degrees(ui: &mut Ui, name: &str, prefix: &str, angle: &mut f64) {
-    let drag = DragValue::new(angle).range(-360.0..=360.0).speed(1.0);
-    let drag = drag.max_decimals(4).prefix(prefix).suffix(" °");
-    named(ui.add(drag), Role::SpinButton, name);
+    number_field(ui, [name, ""], angle, 4, |drag| {
+        let drag = drag.range(-360.0..=360.0).speed(1.0);
+        drag.prefix(prefix).suffix(" °")
+    });
 }
 
 /// The material in place of those of the file; `found` is the file's main one.
@@ -195,10 +196,11 @@ fn material(ui: &mut Ui, found: MaterialOverride, material: &mut Option<Material
                 "0 for plastic, paint and wood, 1 for metal (no unit)",
             ),
         ] {
-            let drag = DragValue::new(value).range(0.0..=1.0).speed(0.005);
-            let drag = ui.add(drag.max_decimals(3).prefix(format!("{name} ")));
-            let name = format!("Object {name}");
-            named(drag.on_hover_text(help), Role::SpinButton, &name);
+            let label = format!("Object {name}");
+            number_field(ui, [&label, help], value, 3, |drag| {
+                let drag = drag.range(0.0..=1.0).speed(0.005);
+                drag.prefix(format!("{name} "))
+            });
         }
     });
 }

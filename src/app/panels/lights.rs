@@ -1,7 +1,7 @@
 //! A switch, a strength and a colour for every lamp.
 
 use crate::app::action::Action;
-use crate::app::controls::{color_button, named, switched};
+use crate::app::controls::{color_button, number_field, switched};
 use crate::app::document::Document;
 use crate::app::lights::place;
 use crate::app::request::{Request, Requests};
@@ -10,7 +10,7 @@ use crate::export::light_layers;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::session::snapshot::LightSource;
-use egui::{Button, Checkbox, DragValue, Grid, Role, Slider, SliderClamping, Ui, WidgetInfo};
+use egui::{Button, Checkbox, Grid, Role, Slider, SliderClamping, Ui, WidgetInfo};
 
 /// The strength at the end of a slider; a larger one can be typed.
 const MAX: f32 = 4.0;
@@ -83,11 +83,11 @@ fn light(ui: &mut Ui, document: &Document, objects: &[usize], name: &str, reques
     let strength = ui.add(slider).on_hover_text(help);
     let named_strength = format!("Strength of {name}");
     strength.widget_info(|| WidgetInfo::slider(true, f64::from(gain.strength), &named_strength));
-    let number = DragValue::new(&mut gain.strength).range(0.0..=f32::MAX);
-    let number = number.speed(0.01).max_decimals(2).suffix(" ×");
-    let typed = ui.add(number.update_while_editing(false));
-    let typed = typed.on_hover_text(help);
-    named(typed, Role::SpinButton, &format!("{named_strength}, typed"));
+    let typed = format!("{named_strength}, typed");
+    number_field(ui, [&typed, help], &mut gain.strength, 2, |drag| {
+        let drag = drag.update_while_editing(false);
+        drag.range(0.0..=f32::MAX).speed(0.01).suffix(" ×")
+    });
     if gain != before {
         requests.ask(Request::Light(objects.to_vec(), gain));
     }

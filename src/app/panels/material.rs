@@ -1,7 +1,7 @@
 //! The selected object's colour, light and gloss, changed by hand.
 
 use crate::app::action::Action;
-use crate::app::controls::{color_button, named, switched};
+use crate::app::controls::{color_button, number_field, switched};
 use crate::app::document::Document;
 use crate::app::number::{number, triple};
 use crate::app::request::{Request, Requests};
@@ -70,10 +70,9 @@ pub fn pane(ui: &mut Ui, parts: &mut Parts<'_>, scene: &Scene) {
     ));
 }
 
-/// A number that is dragged or typed; true when it was changed.
-fn drag(ui: &mut Ui, drag: DragValue<'_>, name: &str, help: &str) -> bool {
-    let response = ui.add(drag.update_while_editing(false)).on_hover_text(help);
-    named(response, Role::SpinButton, name).changed()
+/// A field whose typed text counts once it is left: each change traces light anew.
+fn when_left(drag: DragValue<'_>) -> DragValue<'_> {
+    drag.update_while_editing(false)
 }
 
 fn albedo(ui: &mut Ui, found: &ObjectEstimate, edit: &mut ObjectEdit) {
@@ -83,9 +82,11 @@ fn albedo(ui: &mut Ui, found: &ObjectEstimate, edit: &mut ObjectEdit) {
         let mut albedo = edit.albedo(found.albedo);
         let mut changed = color_button(ui, "Albedo colour", help, &mut albedo);
         for (channel, value) in CHANNELS.into_iter().zip(albedo.as_mut()) {
-            let value = DragValue::new(value).range(0.0..=1.0).speed(0.005);
-            let value = value.max_decimals(3).prefix(format!("{} ", &channel[..1]));
-            changed |= drag(ui, value, &format!("Albedo {channel}"), help);
+            let name = format!("Albedo {channel}");
+            changed |= number_field(ui, [&name, help], value, 3, |drag| {
+                let drag = when_left(drag).range(0.0..=1.0).speed(0.005);
+                drag.prefix(format!("{} ", &channel[..1]))
+            });
         }
         if changed {
             edit.albedo = Some(albedo);
@@ -122,10 +123,11 @@ fn emission(ui: &mut Ui, document: &Document, found: &ObjectEstimate, edit: &mut
             })
             .inner;
         let speed = drag_speed(&document.snapshot.estimate, strength);
-        let value = DragValue::new(&mut strength).range(0.0..=1e12).speed(speed);
         let unit = format!(" {}", document.radiance_unit());
-        let value = value.max_decimals(4).suffix(unit);
-        changed |= drag(ui, value, "Emission strength", help);
+        let named = ["Emission strength", help];
+        changed |= number_field(ui, named, &mut strength, 4, |drag| {
+            when_left(drag).range(0.0..=1e12).speed(speed).suffix(unit)
+        });
         if changed {
             // A colour is as strong as its strongest channel.
             let peak = color.max_element();
@@ -159,9 +161,10 @@ fn gloss(ui: &mut Ui, found: &ObjectEstimate, edit: &mut ObjectEdit) {
             return;
         };
         let value = |ui: &mut Ui, value: &mut f32, name, range, help| {
-            let value = DragValue::new(value).range(range).speed(0.005);
-            let value = value.max_decimals(3).prefix(format!("{name} "));
-            drag(ui, value, name, help)
+            number_field(ui, [name, help], value, 3, |drag| {
+                let drag = when_left(drag).range(range).speed(0.005);
+                drag.prefix(format!("{name} "))
+            })
         };
         let help = "GGX roughness α (no unit): near 0 a mirror, 1 as dull as gloss can be";
         if value(ui, &mut roughness, "roughness", 0.01..=1.0, help) {
