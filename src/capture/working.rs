@@ -12,7 +12,7 @@ use std::sync::Arc;
 pub const WORKING_PIXELS: u64 = 4_000_000;
 
 /// Radius in pixels around a saturated pixel within which blur, resampling and compression mix in clipped light.
-const CLIPPED_RADIUS: usize = 2;
+pub const CLIPPED_RADIUS: usize = 2;
 
 /// All photographs of a capture in memory at the working resolution.
 #[derive(Debug, Clone)]

@@ -1,7 +1,8 @@
 //! The photograph that objects are inserted into, and the conversion between radiance and its values.
 
 use crate::capture::exposure::Exposure;
-use crate::capture::photograph::Photograph;
+use crate::capture::photograph::{BELOW_SATURATION, Photograph};
+use crate::capture::working::CLIPPED_RADIUS;
 use crate::compose::psf_and_grain::PsfAndGrain;
 use crate::error::{Error, Result};
 use crate::export::picture::shown_at;
@@ -14,6 +15,10 @@ use std::sync::Arc;
 
 /// Largest ratio by which a photograph is multiplied.
 const MAX_RATIO: Vec3 = Vec3::splat(4.0);
+
+/// Part of the saturation value up to which a channel surely shows all of its light. Between it and [`BELOW_SATURATION`] lie nine codes
+/// of 8 bits, more than compression moves them by.
+const MAX_UNCLIPPED: f32 = 0.9;
 
 /// A photograph with its camera.
 #[derive(Debug, Clone)]
@@ -128,7 +133,8 @@ impl Backdrop {
                 return self.photograph.pixels[pixel];
             }
             let behind = self.background_light(pixel, layers[pixel].without);
-            let exact = self.value(cover + behind * (1.0 - alpha) + change);
+            let lit = cover + behind * (1.0 - alpha) + change;
+            let exact = self.value(lit.min(self.light(pixel) + cover + change.max(Vec3::ZERO)));
             let place = [self.frame, pixel as u64];
             let grain = self.finish.grain(place, luminance(exact), alpha);
             (exact + grain).clamp(Vec3::ZERO, self.saturation)
@@ -144,19 +150,52 @@ impl Backdrop {
         }
     }
 
-    /// The photograph's exposed light at a pixel; radiance `before` is a lower bound of it where it saturates.
+    /// The photograph's exposed light at a pixel. Where it is clipped, it is at least that of radiance `before`.
     fn background_light(&self, pixel: usize, before: Vec3) -> Vec3 {
-        let saturated = self.photograph.pixels[pixel].cmpge(self.saturation);
         let light = self.light(pixel);
         let bound = light.max(before * self.exposure_at(pixel));
-        Vec3::select(saturated, bound, light)
+        light + (bound - light) * self.clipped(pixel)
     }
 
-    /// The photograph's exposed light at a pixel if its radiance changed from `before` to `after` in the estimate: multiplied by
-    /// their ratio, so that the photograph's own albedo and detail count (Marschner and Greenberg 1997). Beyond [`MAX_RATIO`] light
-    /// is added, since dark pixels hold no detail to amplify.
+    /// How surely each channel of a pixel is clipped, 0 to 1: the mean over the pixels around it that may be. Compression leaves some
+    /// pixels of a clipped surface a little darker than others; a limit between them would give its shadows spots.
+    fn clipped(&self, pixel: usize) -> Vec3 {
+        let limits = [MAX_UNCLIPPED, BELOW_SATURATION].map(|part| self.saturation * part);
+        let sure = |pixel: usize| {
+            let above = (self.photograph.pixels[pixel] - limits[0]) / (limits[1] - limits[0]);
+            above.clamp(Vec3::ZERO, Vec3::ONE)
+        };
+        let own = self.photograph.pixels[pixel].cmpgt(limits[0]);
+        if !own.any() {
+            return Vec3::ZERO;
+        }
+        let [width, height] = [self.photograph.width, self.photograph.height].map(|n| n as usize);
+        let (x, y) = (pixel % width, pixel / width);
+        let (mut sum, mut count) = (Vec3::ZERO, Vec3::ZERO);
+        for y in y.saturating_sub(CLIPPED_RADIUS)..(y + CLIPPED_RADIUS + 1).min(height) {
+            for x in x.saturating_sub(CLIPPED_RADIUS)..(x + CLIPPED_RADIUS + 1).min(width) {
+                let sure = sure(y * width + x);
+                sum += sure;
+                count += Vec3::select(sure.cmpgt(Vec3::ZERO), Vec3::ONE, Vec3::ZERO);
+            }
+        }
+        Vec3::select(own, sum / count.max(Vec3::ONE), Vec3::ZERO)
+    }
+
+    /// The photograph's exposed light at a pixel if its radiance changed from `before` to `after` in the estimate. No clipped pixel
+    /// becomes brighter where light is lost.
     pub fn changed_light(&self, pixel: usize, before: Vec3, after: Vec3) -> Vec3 {
-        let light = self.background_light(pixel, before);
+        let behind = self.background_light(pixel, before);
+        let shown = self.light(pixel);
+        let [behind, changed] =
+            [behind, shown].map(|light| self.changed(pixel, light, before, after));
+        behind.min(changed.max(shown))
+    }
+
+    /// Exposed light at a pixel if its radiance changed from `before` to `after` in the estimate: multiplied by their ratio, so that
+    /// the photograph's own albedo and detail count (Marschner and Greenberg 1997). Beyond [`MAX_RATIO`] light is added, since dark
+    /// pixels hold no detail to amplify.
+    fn changed(&self, pixel: usize, light: Vec3, before: Vec3, after: Vec3) -> Vec3 {
         let lit = before.cmpgt(Vec3::ZERO);
         let ratio = Vec3::select(lit, (after / before).min(MAX_RATIO), Vec3::ONE);
         let added = (after - before * ratio).max(Vec3::ZERO) * self.exposure_at(pixel);
@@ -164,10 +203,11 @@ impl Backdrop {
     }
 
     /// Exposed light of a pixel beside what covers it: α · with + (1 − α) · beside is the composite. With `with` as the mean of
-    /// object and uncovered part, that is α · object + (1 − α) · [`Backdrop::changed_light`].
+    /// object and uncovered part, that is α · object + (1 − α) · the changed light of the photograph.
     fn beside(&self, pixel: usize, layer: &LayeredPixel) -> Vec3 {
         let outline = (layer.with - layer.uncovered) * self.exposure_at(pixel);
-        outline + self.changed_light(pixel, layer.without, layer.uncovered)
+        let behind = self.background_light(pixel, layer.without);
+        outline + self.changed(pixel, behind, layer.without, layer.uncovered)
     }
 
     /// Its change from the photograph.
@@ -185,12 +225,14 @@ impl Backdrop {
 
     /// Composites one pixel. It saturates like the photograph.
     fn blend(&self, pixel: usize, layer: &LayeredPixel) -> Vec3 {
-        let with = layer.with * self.exposure_at(pixel);
+        let with = layer.with * layer.alpha * self.exposure_at(pixel);
         let beside = self.beside(pixel, layer) * (1.0 - layer.alpha);
-        let light = (with * layer.alpha + beside).max(Vec3::ZERO);
+        let light = (with + beside).max(Vec3::ZERO);
         if !self.saturation.is_finite() {
             return light;
         }
+        let added = (self.change(pixel, layer) * (1.0 - layer.alpha)).max(Vec3::ZERO);
+        let light = light.min(self.light(pixel) + with + added);
         self.value(light).clamp(Vec3::ZERO, self.saturation)
     }
 }
@@ -284,6 +326,42 @@ mod tests {
         // Light on black, and a mirror image in a surface estimated dark, are added beyond four times the photograph.
         assert!((shown(0.0, 0.2) - (LEVEL + 0.2)).abs() < 1e-6);
         assert!((shown(0.01, 0.21) - (4.0 * LEVEL + 0.17)).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_clipped_surface_takes_an_even_shadow_though_compression_moves_its_values() {
+        let mut clipped = backdrop(Vec3::ONE);
+        let values = [1.0, 0.99, 0.95, 1.0, 0.98, 1.0, 0.96];
+        let pixels = (0..SIDE * SIDE).map(|pixel| Vec3::splat(values[pixel as usize % 7]));
+        clipped.photograph = Arc::new(Picture {
+            pixels: pixels.collect(),
+            ..*clipped.photograph
+        });
+        let layers = |uncovered: f32| {
+            let layer = LayeredPixel {
+                with: Vec3::splat(uncovered),
+                uncovered: Vec3::splat(uncovered),
+                without: Vec3::splat(1.5),
+                changed: true,
+                ..LayeredPixel::default()
+            };
+            vec![layer; (SIDE * SIDE) as usize]
+        };
+        for finish in [Vec2::ZERO, Vec2::splat(0.7)] {
+            clipped.finish.blur = finish;
+            // Half of one and a half, of which the photograph shows one.
+            for shadow in clipped.composite(&layers(0.75)).pixels {
+                assert!((shadow.x - 0.75).abs() < 0.05, "{shadow}");
+            }
+            // What is left still saturates: nothing is brighter than it was.
+            let slight = clipped.composite(&layers(1.4));
+            assert!(
+                (slight.pixels.iter().zip(&clipped.photograph.pixels)).all(|(a, b)| a.x <= b.x)
+            );
+            assert_eq!(slight.pixels[0].x, 1.0);
+        }
+        let relit = clipped.changed_light(2, Vec3::splat(1.5), Vec3::splat(1.4));
+        assert!((relit.x - 0.95).abs() < 1e-6, "{relit}");
     }
 
     #[test]
