@@ -48,6 +48,11 @@ pub fn number_field<T: Numeric>(
     response.changed()
 }
 
+/// A field whose typed text counts once it is left: each change traces light anew.
+pub fn when_left(drag: DragValue<'_>) -> DragValue<'_> {
+    drag.update_while_editing(false)
+}
+
 /// Three numbers for a point of the capture, of which one is dragged by `speed` a point of the screen; true when changed.
 pub fn point(ui: &mut Ui, name: &str, at: &mut DVec3, speed: f64) -> bool {
     let mut changed = false;

@@ -4,6 +4,7 @@ use crate::capture::camera::Intrinsics;
 use crate::capture::photograph::{Photograph, PhotographSource};
 use crate::capture::{Capture, Frame};
 use crate::error::{Error, Result};
+use crate::math::picture::around;
 use glam::{BVec3, DVec3, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -169,25 +170,20 @@ pub fn reduce(photograph: &Photograph, factor: u32) -> Photograph {
 
 /// Marks the pixels within [`CLIPPED_RADIUS`] of a saturated one as lower bounds: they lack part of their light.
 fn bound_near_clipped(photograph: Arc<Photograph>) -> Arc<Photograph> {
-    let [width, height] = [photograph.width, photograph.height].map(|size| size as usize);
+    let size = [photograph.width, photograph.height].map(|side| side as usize);
     let clipped: Vec<bool> = (0..photograph.pixels.len())
         .map(|pixel| photograph.is_saturated(pixel))
         .collect();
     if !clipped.contains(&true) {
         return photograph;
     }
-    let is_near_clipped = |pixel: usize| {
-        let (x, y) = (pixel % width, pixel / width);
-        let columns = x.saturating_sub(CLIPPED_RADIUS)..(x + CLIPPED_RADIUS + 1).min(width);
-        (y.saturating_sub(CLIPPED_RADIUS)..(y + CLIPPED_RADIUS + 1).min(height)).any(|row| {
-            clipped[row * width + columns.start..row * width + columns.end].contains(&true)
-        })
-    };
     let limits = (0..clipped.len())
-        .map(|pixel| match is_near_clipped(pixel) {
-            true => photograph.limit(pixel).min(photograph.pixels[pixel]),
-            false => photograph.limit(pixel),
-        })
+        .map(
+            |pixel| match around(size, pixel, CLIPPED_RADIUS).any(|near| clipped[near]) {
+                true => photograph.limit(pixel).min(photograph.pixels[pixel]),
+                false => photograph.limit(pixel),
+            },
+        )
         .collect();
     let mut bounded = Arc::unwrap_or_clone(photograph);
     bounded.limits = limits;

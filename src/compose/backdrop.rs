@@ -7,7 +7,7 @@ use crate::compose::psf_and_grain::PsfAndGrain;
 use crate::error::{Error, Result};
 use crate::export::picture::shown_at;
 use crate::math::color::luminance;
-use crate::math::picture::Picture;
+use crate::math::picture::{Picture, around};
 use crate::scene::camera::Camera;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -16,8 +16,8 @@ use std::sync::Arc;
 /// Largest ratio by which a photograph is multiplied.
 const MAX_RATIO: Vec3 = Vec3::splat(4.0);
 
-/// Part of the saturation value up to which a channel surely shows all of its light. Between it and [`BELOW_SATURATION`] lie nine codes
-/// of 8 bits, more than compression moves them by.
+/// Part of the saturation value up to which a channel surely shows all of its light. Between it and [`BELOW_SATURATION`] lie eight codes
+/// of 8-bit sRGB, so that noise and compression of a code or two change little.
 const MAX_UNCLIPPED: f32 = 0.9;
 
 /// A photograph with its camera.
@@ -134,7 +134,7 @@ impl Backdrop {
             }
             let behind = self.background_light(pixel, layers[pixel].without);
             let lit = cover + behind * (1.0 - alpha) + change;
-            let exact = self.value(lit.min(self.light(pixel) + cover + change.max(Vec3::ZERO)));
+            let exact = self.value(self.limited(pixel, lit, cover, change));
             let place = [self.frame, pixel as u64];
             let grain = self.finish.grain(place, luminance(exact), alpha);
             (exact + grain).clamp(Vec3::ZERO, self.saturation)
@@ -161,25 +161,18 @@ impl Backdrop {
     /// pixels of a clipped surface a little darker than others; a limit between them would give its shadows spots.
     fn clipped(&self, pixel: usize) -> Vec3 {
         let limits = [MAX_UNCLIPPED, BELOW_SATURATION].map(|part| self.saturation * part);
-        let sure = |pixel: usize| {
-            let above = (self.photograph.pixels[pixel] - limits[0]) / (limits[1] - limits[0]);
-            above.clamp(Vec3::ZERO, Vec3::ONE)
-        };
-        let own = self.photograph.pixels[pixel].cmpgt(limits[0]);
-        if !own.any() {
+        let above = self.photograph.pixels[pixel].cmpgt(limits[0]);
+        if !above.any() {
             return Vec3::ZERO;
         }
-        let [width, height] = [self.photograph.width, self.photograph.height].map(|n| n as usize);
-        let (x, y) = (pixel % width, pixel / width);
+        let size = [self.photograph.width, self.photograph.height].map(|side| side as usize);
         let (mut sum, mut count) = (Vec3::ZERO, Vec3::ZERO);
-        for y in y.saturating_sub(CLIPPED_RADIUS)..(y + CLIPPED_RADIUS + 1).min(height) {
-            for x in x.saturating_sub(CLIPPED_RADIUS)..(x + CLIPPED_RADIUS + 1).min(width) {
-                let sure = sure(y * width + x);
-                sum += sure;
-                count += Vec3::select(sure.cmpgt(Vec3::ZERO), Vec3::ONE, Vec3::ZERO);
-            }
+        for near in around(size, pixel, CLIPPED_RADIUS) {
+            let part = (self.photograph.pixels[near] - limits[0]) / (limits[1] - limits[0]);
+            sum += part.clamp(Vec3::ZERO, Vec3::ONE);
+            count += Vec3::select(part.cmpgt(Vec3::ZERO), Vec3::ONE, Vec3::ZERO);
         }
-        Vec3::select(own, sum / count.max(Vec3::ONE), Vec3::ZERO)
+        Vec3::select(above, sum / count.max(Vec3::ONE), Vec3::ZERO)
     }
 
     /// The photograph's exposed light at a pixel if its radiance changed from `before` to `after` in the estimate. No clipped pixel
@@ -202,17 +195,24 @@ impl Backdrop {
         light * ratio + added
     }
 
-    /// Exposed light of a pixel beside what covers it: α · with + (1 − α) · beside is the composite. With `with` as the mean of
-    /// object and uncovered part, that is α · object + (1 − α) · the changed light of the photograph.
-    fn beside(&self, pixel: usize, layer: &LayeredPixel) -> Vec3 {
-        let outline = (layer.with - layer.uncovered) * self.exposure_at(pixel);
+    /// Exposed light of a pixel behind what covers it, and beside: α · with + (1 − α) · beside is the composite. With `with` as the mean
+    /// of object and uncovered part, that is α · object + (1 − α) · the changed light of the photograph.
+    fn behind_and_beside(&self, pixel: usize, layer: &LayeredPixel) -> [Vec3; 2] {
         let behind = self.background_light(pixel, layer.without);
-        outline + self.changed(pixel, behind, layer.without, layer.uncovered)
+        let outline = (layer.with - layer.uncovered) * self.exposure_at(pixel);
+        let changed = self.changed(pixel, behind, layer.without, layer.uncovered);
+        [behind, outline + changed]
     }
 
-    /// Its change from the photograph.
+    /// The change of a pixel's light beside what covers it.
     fn change(&self, pixel: usize, layer: &LayeredPixel) -> Vec3 {
-        self.beside(pixel, layer) - self.background_light(pixel, layer.without)
+        let [behind, beside] = self.behind_and_beside(pixel, layer);
+        beside - behind
+    }
+
+    /// Exposed light `lit` of a pixel, no brighter than the photograph with what covers the pixel and what the change adds.
+    fn limited(&self, pixel: usize, lit: Vec3, cover: Vec3, change: Vec3) -> Vec3 {
+        lit.min(self.light(pixel) + cover + change.max(Vec3::ZERO))
     }
 
     /// What the objects add to a pixel's light beside what they cover and take from it, as radiance of the estimate: α · with +
@@ -225,14 +225,14 @@ impl Backdrop {
 
     /// Composites one pixel. It saturates like the photograph.
     fn blend(&self, pixel: usize, layer: &LayeredPixel) -> Vec3 {
-        let with = layer.with * layer.alpha * self.exposure_at(pixel);
-        let beside = self.beside(pixel, layer) * (1.0 - layer.alpha);
-        let light = (with + beside).max(Vec3::ZERO);
+        let free = 1.0 - layer.alpha;
+        let cover = layer.with * layer.alpha * self.exposure_at(pixel);
+        let [behind, beside] = self.behind_and_beside(pixel, layer);
+        let light = (cover + beside * free).max(Vec3::ZERO);
         if !self.saturation.is_finite() {
             return light;
         }
-        let added = (self.change(pixel, layer) * (1.0 - layer.alpha)).max(Vec3::ZERO);
-        let light = light.min(self.light(pixel) + with + added);
+        let light = self.limited(pixel, light, cover, (beside - behind) * free);
         self.value(light).clamp(Vec3::ZERO, self.saturation)
     }
 }

@@ -44,3 +44,28 @@ impl Picture {
         })
     }
 }
+
+/// The pixels of a picture of a width and height that lie within `radius` rows and columns of one, itself included, row by row.
+pub fn around(
+    [width, height]: [usize; 2],
+    pixel: usize,
+    radius: usize,
+) -> impl Iterator<Item = usize> {
+    let near = move |at: usize, side: usize| at.saturating_sub(radius)..(at + radius + 1).min(side);
+    near(pixel / width, height)
+        .flat_map(move |y| near(pixel % width, width).map(move |x| y * width + x))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_lies_around_a_pixel_ends_at_the_edges() {
+        let near = |pixel, radius| around([4, 3], pixel, radius).collect::<Vec<_>>();
+        assert_eq!(near(0, 1), [0, 1, 4, 5]);
+        assert_eq!(near(6, 1), [1, 2, 3, 5, 6, 7, 9, 10, 11]);
+        assert_eq!(near(11, 2), [1, 2, 3, 5, 6, 7, 9, 10, 11]);
+        assert_eq!(near(5, 0), [5]);
+    }
+}

@@ -1,7 +1,7 @@
 //! A switch, a strength and a colour for every lamp.
 
 use crate::app::action::Action;
-use crate::app::controls::{color_button, number_field, switched};
+use crate::app::controls::{color_button, number_field, switched, when_left};
 use crate::app::document::Document;
 use crate::app::lights::place;
 use crate::app::request::{Request, Requests};
@@ -85,8 +85,8 @@ fn light(ui: &mut Ui, document: &Document, objects: &[usize], name: &str, reques
     strength.widget_info(|| WidgetInfo::slider(true, f64::from(gain.strength), &named_strength));
     let typed = format!("{named_strength}, typed");
     number_field(ui, [&typed, help], &mut gain.strength, 2, |drag| {
-        let drag = drag.update_while_editing(false);
-        drag.range(0.0..=f32::MAX).speed(0.01).suffix(" ×")
+        let drag = when_left(drag).range(0.0..=f32::MAX);
+        drag.speed(0.01).suffix(" ×")
     });
     if gain != before {
         requests.ask(Request::Light(objects.to_vec(), gain));

@@ -1,7 +1,7 @@
 //! The selected object's colour, light and gloss, changed by hand.
 
 use crate::app::action::Action;
-use crate::app::controls::{color_button, number_field, switched};
+use crate::app::controls::{color_button, number_field, switched, when_left};
 use crate::app::document::Document;
 use crate::app::number::{number, triple};
 use crate::app::request::{Request, Requests};
@@ -11,7 +11,7 @@ use crate::inverse::estimate::{Estimate, ObjectEstimate};
 use crate::scene::Scene;
 use crate::session::edits::ObjectEdit;
 use crate::transport::material::DIELECTRIC;
-use egui::{Button, DragValue, Grid, Role, Ui};
+use egui::{Button, Grid, Role, Ui};
 use glam::Vec3;
 
 const CHANNELS: [&str; 3] = ["red", "green", "blue"];
@@ -68,11 +68,6 @@ pub fn pane(ui: &mut Ui, parts: &mut Parts<'_>, scene: &Scene) {
     ui.weak(format!(
         "found: albedo {albedo}, emission {emission} {unit}, {gloss}"
     ));
-}
-
-/// A field whose typed text counts once it is left: each change traces light anew.
-fn when_left(drag: DragValue<'_>) -> DragValue<'_> {
-    drag.update_while_editing(false)
 }
 
 fn albedo(ui: &mut Ui, found: &ObjectEstimate, edit: &mut ObjectEdit) {
