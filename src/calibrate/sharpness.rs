@@ -1,15 +1,16 @@
 //! Sharpness of each photograph relative to the others that show the same edges.
 //!
 //! Two photographs that see two neighbouring surface points from about the same distance should show the same step of
-//! brightness between them. A photograph that is blurred by motion or focus shows a smaller one. Steps well above noise are
-//! compared for each pair of photographs, in both directions, so that the loss by interpolation cancels. One contrast per
-//! photograph is then fitted to all pairs by least squares.
+//! brightness between them. A photograph that is blurred by motion or focus shows a smaller one. Steps are compared for each pair
+//! of photographs, in both directions, so that the loss by interpolation cancels. Each is chosen and weighted by what further
+//! photographs show of it, so that the noise of the two does not count (instrumental variables; Fuller 1987, section 1.4). One
+//! contrast per photograph is then fitted to all pairs by least squares.
 
 use crate::calibrate::held_out::HoldOut;
 use crate::calibrate::problem::Problem;
 use crate::capture::photograph::Photograph;
 use crate::math::color::luminance;
-use crate::math::stats::{quantile, upper_median};
+use crate::math::stats::quantile;
 use crate::scene::Scene;
 use crate::scene::geometry::Ray;
 use glam::{Vec2, Vec3};
@@ -20,15 +21,14 @@ use rayon::prelude::*;
 const PAIRS: usize = 6_000;
 /// Greatest number of photographs that each one is compared with.
 const OTHERS: usize = 24;
-/// Least step that counts, in log luminance.
+/// Least step that counts, in log luminance, in the mean of further photographs.
 const MIN_STEP: f32 = 0.1;
-/// Least step that counts, as a multiple of the median step, which is mostly noise.
-const ABOVE_MEDIAN: f32 = 4.0;
 /// Steps are clamped to this, in log luminance.
 const MAX_STEP: f32 = 1.0;
-/// Least number of steps that two photographs must share in each direction.
-const MIN_STEPS: usize = 40;
-/// Least number of compared photographs for which the median contrast is meaningful.
+/// Ratios between two photographs' contrasts count up to this standard error of their logarithm. More is outside of where its
+/// estimate is linear.
+const MAX_ERROR: f64 = 0.3;
+/// Least number of photographs that share edges for which their median contrast is meaningful.
 const MIN_PHOTOGRAPHS: usize = 4;
 /// Range of the distance of the two points in the other photograph, in its pixels.
 const SIMILAR_RESOLUTION: [f32; 2] = [0.75, 1.33];
@@ -44,11 +44,12 @@ const RIDGE: f64 = 1e-6;
 /// Sharpness of photographs.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Sharpness {
-    /// For each photograph, the contrast of its edges relative to the median photograph; `None` if it shares too few edges.
+    /// For each photograph, the contrast of its edges relative to the median of the photographs that share edges with it, or with
+    /// those that do; `None` if it shares too few.
     pub contrast: Vec<Option<f64>>,
 }
 
-/// The steps of log luminance between the same two points in two photographs.
+/// The steps of log luminance between the same two points in two photographs, each times the mean step of further ones.
 #[derive(Debug, Clone, Copy)]
 struct Step {
     other: u32,
@@ -58,25 +59,19 @@ struct Step {
     others: f32,
 }
 
-/// The steps that a photograph shares with the others.
-#[derive(Debug, Default)]
-struct Steps {
-    /// [`Step::size`] of each shared step.
-    sizes: Vec<f32>,
-    /// The steps of at least [`MIN_STEP`].
-    large: Vec<Step>,
+/// How the contrast of a photograph compares to that of another one.
+#[derive(Debug, Clone, Copy)]
+struct Ratio {
+    other: usize,
+    logarithm: f64,
+    /// Variance of the logarithm.
+    variance: f64,
 }
 
 /// Log luminance of a photograph's pixels; NaN where a pixel is masked, held out, saturated or too dark.
 struct Levels<'a> {
     photograph: &'a Photograph,
     logarithms: Vec<f32>,
-}
-
-impl Step {
-    fn size(&self) -> f32 {
-        self.own.abs().max(self.others.abs())
-    }
 }
 
 impl Sharpness {
@@ -86,21 +81,15 @@ impl Sharpness {
             .map(|(frame, photograph)| Levels::new(photograph, frame, hold_out))
             .collect();
         let frames = levels.len();
-        let mut steps: Vec<Steps> = (0..frames)
+        let ratios: Vec<Vec<Ratio>> = (0..frames)
             .into_par_iter()
             .map(|frame| match left_out[frame] {
-                true => Steps::default(),
-                false => steps(problem, &levels, left_out, frame),
+                true => Vec::new(),
+                false => ratios(steps(problem, &levels, left_out, frame)),
             })
             .collect();
-        let mut sizes: Vec<f32> = (steps.iter_mut())
-            .flat_map(|steps| std::mem::take(&mut steps.sizes))
-            .collect();
-        let median = upper_median(&mut sizes).unwrap_or(0.0);
-        let min_step = MIN_STEP.max(ABOVE_MEDIAN * median);
         Self {
-            contrast: fit_contrasts(&ratios(&steps, min_step))
-                .unwrap_or_else(|| vec![None; frames]),
+            contrast: fit_contrasts(&ratios).unwrap_or_else(|| vec![None; frames]),
         }
     }
 
@@ -131,69 +120,75 @@ impl Sharpness {
     }
 }
 
-/// For each photograph, a list of (other photograph, log ratio of the summed squares of own and other steps, number of steps),
-/// over steps of at least `min_step`.
-fn ratios(steps: &[Steps], min_step: f32) -> Vec<Vec<(usize, f64, usize)>> {
-    let ratios_of = |steps: &Steps| {
-        let mut large: Vec<&Step> = (steps.large.iter())
-            .filter(|step| step.size() >= min_step)
-            .collect();
-        large.sort_by_key(|step| step.other);
-        let energy = |step: f32| f64::from(step.clamp(-MAX_STEP, MAX_STEP)).powi(2);
-        (large.chunk_by(|a, b| a.other == b.other))
-            .map(|pair| {
-                let own: f64 = pair.iter().map(|s| energy(s.own)).sum();
-                let others: f64 = pair.iter().map(|s| energy(s.others)).sum();
-                (pair[0].other as usize, (own / others).ln(), pair.len())
+/// How a photograph compares to each of those that share `steps` with it. Ratios with the steps of the other are too large by what
+/// interpolation loses.
+fn ratios(mut steps: Vec<Step>) -> Vec<Ratio> {
+    steps.sort_by_key(|step| step.other);
+    (steps.chunk_by(|a, b| a.other == b.other))
+        .filter_map(|pair| {
+            // Logarithm of a sum, and its variance to first order.
+            let sum = |values: &dyn Fn(&Step) -> f32| {
+                let values = || pair.iter().map(|step| f64::from(values(step)));
+                let (sum, squares) = (values().sum::<f64>(), values().map(|v| v * v).sum::<f64>());
+                (sum > 0.0).then(|| (sum.ln(), squares / (sum * sum)))
+            };
+            let (own, others) = (sum(&|step| step.own)?, sum(&|step| step.others)?);
+            Some(Ratio {
+                other: pair[0].other as usize,
+                logarithm: own.0 - others.0,
+                variance: own.1 + others.1,
             })
-            .filter(|(_, ratio, _)| ratio.is_finite())
-            .collect()
-    };
-    steps.iter().map(ratios_of).collect()
+        })
+        .collect()
 }
 
-/// The least-squares contrasts of photographs, scaled to a median of 1, from their [`ratios`]; `None` if too few share edges.
-fn fit_contrasts(ratios: &[Vec<(usize, f64, usize)>]) -> Option<Vec<Option<f64>>> {
+/// The least-squares contrasts of photographs, scaled to a median of 1, from their [`ratios`]; `None` where too few share edges.
+fn fit_contrasts(ratios: &[Vec<Ratio>]) -> Option<Vec<Option<f64>>> {
     let frames = ratios.len();
     let mut matrix = DMatrix::<f64>::identity(frames, frames) * RIDGE;
     let mut right = DVector::<f64>::zeros(frames);
-    let mut pairs = vec![0; frames];
+    let mut groups: Vec<usize> = (0..frames).collect();
     for (frame, own) in ratios.iter().enumerate() {
-        for &(other, ratio, count) in own.iter().filter(|pair| pair.0 > frame) {
-            let back = ratios[other].iter().find(|pair| pair.0 == frame);
-            let Some(&(_, back, count_back)) = back else {
+        for ratio in own.iter().filter(|ratio| ratio.other > frame) {
+            let other = ratio.other;
+            let Some(back) = ratios[other].iter().find(|back| back.other == frame) else {
                 continue;
             };
-            let count = count.min(count_back);
-            if count < MIN_STEPS {
+            // Half the difference of both directions: what interpolation loses cancels.
+            let difference = 0.5 * (ratio.logarithm - back.logarithm);
+            let variance = 0.25 * (ratio.variance + back.variance);
+            if variance > MAX_ERROR * MAX_ERROR {
                 continue;
             }
-            // Energies are squared contrasts, which gives one half; the mean of both directions gives the other half.
-            let (difference, weight) = (0.25 * (ratio - back), count as f64);
+            let weight = 1.0 / variance;
             for (a, b, sign) in [(frame, other, 1.0), (other, frame, -1.0)] {
                 matrix[(a, a)] += weight;
                 matrix[(a, b)] -= weight;
                 right[a] += sign * weight * difference;
-                pairs[a] += 1;
+            }
+            let [joined, group] = [groups[other], groups[frame]];
+            for of in groups.iter_mut().filter(|of| **of == joined) {
+                *of = group;
             }
         }
     }
     let logarithms = matrix.cholesky()?.solve(&right);
-    let is_known = |frame: &usize| pairs[*frame] > 0;
-    let mut known: Vec<f64> = (0..frames)
-        .filter(is_known)
-        .map(|frame| logarithms[frame])
-        .collect();
-    if known.len() < MIN_PHOTOGRAPHS {
-        return None;
-    }
-    let median = quantile(&mut known, 0.5)?;
-    let contrast = |frame| is_known(&frame).then(|| (logarithms[frame] - median).exp());
+
+    // Nothing is known between photographs that no chain of shared edges joins.
+    let contrast = |frame: usize| {
+        let mut group: Vec<f64> = (logarithms.iter().zip(&groups))
+            .filter(|(_, group)| **group == groups[frame])
+            .map(|(logarithm, _)| *logarithm)
+            .collect();
+        let is_known = group.len() >= MIN_PHOTOGRAPHS;
+        let median = quantile(&mut group, 0.5).filter(|_| is_known)?;
+        Some((logarithms[frame] - median).exp())
+    };
     Some((0..frames).map(contrast).collect())
 }
 
 /// The steps between neighbouring pixels of a photograph, each with the step between the same points in other photographs.
-fn steps(problem: &Problem, levels: &[Levels], left_out: &[bool], frame: usize) -> Steps {
+fn steps(problem: &Problem, levels: &[Levels], left_out: &[bool], frame: usize) -> Vec<Step> {
     let scene = &*problem.scene;
     let own = &levels[frame];
     let (width, height) = (own.photograph.width, own.photograph.height);
@@ -206,7 +201,7 @@ fn steps(problem: &Problem, levels: &[Levels], left_out: &[bool], frame: usize) 
             .step_by(spacing)
             .map(move |x| [x, y])
     });
-    let mut steps = Steps::default();
+    let mut steps = Vec::new();
     for [x, y] in pixels {
         for [u, v] in [[x + 1, y], [x, y + 1]] {
             let step = own.at([u, v]) - own.at([x, y]);
@@ -217,18 +212,22 @@ fn steps(problem: &Problem, levels: &[Levels], left_out: &[bool], frame: usize) 
             if object != neighbour || step.is_nan() {
                 continue;
             }
-            for &other in &others {
-                let Some(others) = step_in(scene, &levels[other], other, object, [a, b]) else {
-                    continue;
-                };
-                let shared = Step {
-                    other: other as u32,
-                    own: step,
-                    others,
-                };
-                steps.sizes.push(shared.size());
-                if shared.size() >= MIN_STEP {
-                    steps.large.push(shared);
+            let clamped = |step: f32| step.clamp(-MAX_STEP, MAX_STEP);
+            let seen: Vec<(usize, f32)> = (others.iter())
+                .filter_map(|&other| {
+                    let step = step_in(scene, &levels[other], other, object, [a, b])?;
+                    Some((other, clamped(step)))
+                })
+                .collect();
+            let sum: f32 = seen.iter().map(|(_, step)| step).sum();
+            for &(other, others) in &seen {
+                let further = (sum - others) / (seen.len() as f32 - 1.0);
+                if further.abs() >= MIN_STEP {
+                    steps.push(Step {
+                        other: other as u32,
+                        own: clamped(step) * further,
+                        others: others * further,
+                    });
                 }
             }
         }

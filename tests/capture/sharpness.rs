@@ -97,3 +97,21 @@ fn photographs_that_are_left_out_have_no_say_and_none() {
     assert_eq!(with.contrast[4], None);
     assert_eq!(with.weight(4), 1.0);
 }
+
+/// The built-in room without edges; the first photographs have ten times the noise of the others, as those of dark corners have.
+#[test]
+fn noise_in_a_plain_room_is_no_contrast() {
+    let mut problem = ROOM.clone();
+    for (frame, photograph) in problem.photographs.iter_mut().enumerate() {
+        let noise = if frame < 4 { 0.3 } else { 0.03 };
+        let pixels = (0..photograph.pixels.len() as u64).map(|pixel| {
+            let mut stream = Stream::new(7, frame as u64, pixel, 0);
+            Vec3::splat(0.3 * (noise * stream.normal()).exp())
+        });
+        *photograph = Arc::new(Photograph {
+            pixels: pixels.collect(),
+            ..Photograph::clone(photograph)
+        });
+    }
+    assert_eq!(contrasts(&problem), vec![None; problem.photographs.len()]);
+}
