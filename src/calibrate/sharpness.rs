@@ -180,8 +180,10 @@ fn fit_contrasts(ratios: &[Vec<Ratio>]) -> Option<Vec<Option<f64>>> {
             .filter(|(_, group)| **group == groups[frame])
             .map(|(logarithm, _)| *logarithm)
             .collect();
-        let is_known = group.len() >= MIN_PHOTOGRAPHS;
-        let median = quantile(&mut group, 0.5).filter(|_| is_known)?;
+        if group.len() < MIN_PHOTOGRAPHS {
+            return None;
+        }
+        let median = quantile(&mut group, 0.5)?;
         Some((logarithms[frame] - median).exp())
     };
     Some((0..frames).map(contrast).collect())
@@ -221,6 +223,7 @@ fn steps(problem: &Problem, levels: &[Levels], left_out: &[bool], frame: usize) 
                 .collect();
             let sum: f32 = seen.iter().map(|(_, step)| step).sum();
             for &(other, others) in &seen {
+                // NaN without further photographs; the step is left out then.
                 let further = (sum - others) / (seen.len() as f32 - 1.0);
                 if further.abs() >= MIN_STEP {
                     steps.push(Step {

@@ -178,12 +178,13 @@ fn bound_near_clipped(photograph: Arc<Photograph>) -> Arc<Photograph> {
         return photograph;
     }
     let limits = (0..clipped.len())
-        .map(
-            |pixel| match around(size, pixel, CLIPPED_RADIUS).any(|near| clipped[near]) {
+        .map(|pixel| {
+            let is_near_clipped = around(size, pixel, CLIPPED_RADIUS).any(|near| clipped[near]);
+            match is_near_clipped {
                 true => photograph.limit(pixel).min(photograph.pixels[pixel]),
                 false => photograph.limit(pixel),
-            },
-        )
+            }
+        })
         .collect();
     let mut bounded = Arc::unwrap_or_clone(photograph);
     bounded.limits = limits;
