@@ -4,12 +4,14 @@
 //! brightness between them. A photograph that is blurred by motion or focus shows a smaller one. Steps are compared for each pair
 //! of photographs, in both directions, so that the loss by interpolation cancels. Each is chosen and weighted by what further
 //! photographs show of it, so that the noise of the two does not count (instrumental variables; Fuller 1987, section 1.4). One
-//! contrast per photograph is then fitted to all pairs by least squares.
+//! contrast per photograph is then fitted to all pairs by least squares. Its standard error is that of the jackknife over groups of
+//! surface points (Efron and Stein 1981).
 
 use crate::calibrate::held_out::HoldOut;
 use crate::calibrate::problem::Problem;
 use crate::capture::photograph::Photograph;
 use crate::math::color::luminance;
+use crate::math::rng::splitmix64;
 use crate::math::stats::quantile;
 use crate::scene::Scene;
 use crate::scene::geometry::Ray;
@@ -36,7 +38,13 @@ const SIMILAR_RESOLUTION: [f32; 2] = [0.75, 1.33];
 const SAME_DEPTH: f32 = 0.02;
 /// Pixels darker than this fraction of a photograph's median hold mostly noise.
 const ABOVE_NOISE: f64 = 0.1;
-/// Photographs with a relative contrast below this are reported as blurred.
+/// Number of groups of surface points.
+const GROUPS: u8 = 8;
+/// Side of the cubes whose points are in one group, as a fraction of the scene's diameter: about an edge of something.
+const CUBE: f32 = 0.02;
+/// A contrast counts as lower than 1 by this many standard errors.
+const ERRORS: f64 = 2.0;
+/// Photographs whose relative contrast is surely below this are reported as blurred.
 const BLURRED: f64 = 0.85;
 /// Regularization of the undetermined directions of the least-squares fit.
 const RIDGE: f64 = 1e-6;
@@ -46,7 +54,23 @@ const RIDGE: f64 = 1e-6;
 pub struct Sharpness {
     /// For each photograph, the contrast of its edges relative to the median of the photographs that share edges with it, or with
     /// those that do; `None` if it shares too few.
-    pub contrast: Vec<Option<f64>>,
+    pub contrast: Vec<Option<Contrast>>,
+}
+
+/// A measured contrast.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Contrast {
+    /// Relative to the median.
+    pub ratio: f64,
+    /// Standard error of its logarithm.
+    pub error: f64,
+}
+
+impl Contrast {
+    /// The greatest contrast that the measurement leaves open.
+    fn at_most(self) -> f64 {
+        self.ratio * (ERRORS * self.error).exp()
+    }
 }
 
 /// The steps of log luminance between the same two points in two photographs, each times the mean step of further ones.
@@ -57,6 +81,8 @@ struct Step {
     own: f32,
     /// Step in the other photograph.
     others: f32,
+    /// The group of its surface point.
+    group: u8,
 }
 
 /// How the contrast of a photograph compares to that of another one.
@@ -80,23 +106,38 @@ impl Sharpness {
         let levels: Vec<Levels> = (problem.photographs.par_iter().enumerate())
             .map(|(frame, photograph)| Levels::new(photograph, frame, hold_out))
             .collect();
-        let frames = levels.len();
-        let ratios: Vec<Vec<Ratio>> = (0..frames)
+        let steps: Vec<Vec<Step>> = (0..levels.len())
             .into_par_iter()
             .map(|frame| match left_out[frame] {
                 true => Vec::new(),
-                false => ratios(steps(problem, &levels, left_out, frame)),
+                false => steps(problem, &levels, left_out, frame),
             })
             .collect();
+        let logarithms = |without: Option<u8>| {
+            let ratios: Vec<_> = steps.iter().map(|steps| ratios(steps, without)).collect();
+            fit_contrasts(&ratios).unwrap_or_else(|| vec![None; steps.len()])
+        };
+        let all = logarithms(None);
+        let parts: Vec<_> = (0..GROUPS).map(|group| logarithms(Some(group))).collect();
+        let contrast = |frame: usize| {
+            let parts: Option<Vec<f64>> = parts.iter().map(|part| part[frame]).collect();
+            let logarithm = all[frame]?;
+            Some(Contrast {
+                ratio: logarithm.exp(),
+                error: jackknife_error(&parts?),
+            })
+        };
         Self {
-            contrast: fit_contrasts(&ratios).unwrap_or_else(|| vec![None; frames]),
+            contrast: (0..steps.len()).map(contrast).collect(),
         }
     }
 
     /// One sentence that names the blurred photographs; `None` if there are none.
     pub fn remark(&self) -> Option<String> {
         let mut blurred: Vec<(usize, f64)> = (self.contrast.iter().enumerate())
-            .filter_map(|(frame, contrast)| Some((frame, contrast.filter(|c| *c < BLURRED)?)))
+            .filter_map(|(frame, contrast)| Some((frame, (*contrast)?)))
+            .filter(|(_, contrast)| contrast.at_most() < BLURRED)
+            .map(|(frame, contrast)| (frame, contrast.ratio))
             .collect();
         blurred.sort_by(|a, b| a.1.total_cmp(&b.1));
         let each: Vec<String> = (blurred.iter())
@@ -113,22 +154,34 @@ impl Sharpness {
     }
 
     /// Weight of a photograph's pixels for fine detail: its squared contrast, the power of the signal relative to the same noise,
-    /// at most 1. Contrasts above 1 come from noise; unknown contrasts count as 1.
+    /// at most 1. A contrast counts as the greatest that its error leaves open, and as 1 if it is unknown.
     pub fn weight(&self, frame: usize) -> f32 {
         let contrast = self.contrast.get(frame).copied().flatten();
-        contrast.unwrap_or(1.0).min(1.0).powi(2) as f32
+        contrast.map_or(1.0, Contrast::at_most).min(1.0).powi(2) as f32
     }
 }
 
-/// How a photograph compares to each of those that share `steps` with it. Ratios with the steps of the other are too large by what
-/// interpolation loses.
-fn ratios(mut steps: Vec<Step>) -> Vec<Ratio> {
-    steps.sort_by_key(|step| step.other);
+/// The standard error of a mean from its values without each of the groups.
+fn jackknife_error(without: &[f64]) -> f64 {
+    let count = without.len() as f64;
+    let mean = without.iter().sum::<f64>() / count;
+    let squares: f64 = without.iter().map(|value| (value - mean).powi(2)).sum();
+    (squares * (count - 1.0) / count).sqrt()
+}
+
+/// How a photograph compares to each of those that share `steps` with it, in order of these, by all steps but those of one group.
+/// Ratios with the steps of the other are too large by what interpolation loses.
+fn ratios(steps: &[Step], without: Option<u8>) -> Vec<Ratio> {
     (steps.chunk_by(|a, b| a.other == b.other))
         .filter_map(|pair| {
+            let counts = |step: &&Step| Some(step.group) != without;
             // Logarithm of a sum, and its variance to first order.
             let sum = |values: &dyn Fn(&Step) -> f32| {
-                let values = || pair.iter().map(|step| f64::from(values(step)));
+                let values = || {
+                    pair.iter()
+                        .filter(counts)
+                        .map(|step| f64::from(values(step)))
+                };
                 let (sum, squares) = (values().sum::<f64>(), values().map(|v| v * v).sum::<f64>());
                 (sum > 0.0).then(|| (sum.ln(), squares / (sum * sum)))
             };
@@ -142,7 +195,8 @@ fn ratios(mut steps: Vec<Step>) -> Vec<Ratio> {
         .collect()
 }
 
-/// The least-squares contrasts of photographs, scaled to a median of 1, from their [`ratios`]; `None` where too few share edges.
+/// Logarithms of the least-squares contrasts of photographs, scaled to a median of 1, from their [`ratios`]; `None` where too few
+/// share edges.
 fn fit_contrasts(ratios: &[Vec<Ratio>]) -> Option<Vec<Option<f64>>> {
     let frames = ratios.len();
     let mut matrix = DMatrix::<f64>::identity(frames, frames) * RIDGE;
@@ -184,12 +238,13 @@ fn fit_contrasts(ratios: &[Vec<Ratio>]) -> Option<Vec<Option<f64>>> {
             return None;
         }
         let median = quantile(&mut group, 0.5)?;
-        Some((logarithms[frame] - median).exp())
+        Some(logarithms[frame] - median)
     };
     Some((0..frames).map(contrast).collect())
 }
 
-/// The steps between neighbouring pixels of a photograph, each with the step between the same points in other photographs.
+/// The steps between neighbouring pixels of a photograph, each with the step between the same points in another one, in the order of
+/// the others.
 fn steps(problem: &Problem, levels: &[Levels], left_out: &[bool], frame: usize) -> Vec<Step> {
     let scene = &*problem.scene;
     let own = &levels[frame];
@@ -230,12 +285,21 @@ fn steps(problem: &Problem, levels: &[Levels], left_out: &[bool], frame: usize) 
                         other: other as u32,
                         own: clamped(step) * further,
                         others: others * further,
+                        group: group(a / (CUBE * scene.diameter)),
                     });
                 }
             }
         }
     }
+    steps.sort_by_key(|step| step.other);
     steps
+}
+
+/// The group of a surface point, in cubes of side 1.
+fn group(point: Vec3) -> u8 {
+    let cell = point.floor().as_i64vec3();
+    let hash = (cell.to_array().into_iter()).fold(0, |hash, i| splitmix64(hash ^ i as u64));
+    (hash % u64::from(GROUPS)) as u8
 }
 
 /// The frames with the most similar views: nearby cameras with a similar direction.

@@ -51,9 +51,14 @@ fn moved(photograph: &Photograph, x: u32, y: u32) -> Vec3 {
     near.map(row).sum::<Vec3>() / count
 }
 
-fn contrasts(problem: &Problem) -> Vec<Option<f64>> {
+fn sharpness(problem: &Problem) -> Sharpness {
     let none = vec![false; problem.photographs.len()];
-    Sharpness::new(problem, HoldOut::from(&Settings::default()), &none).contrast
+    Sharpness::new(problem, HoldOut::from(&Settings::default()), &none)
+}
+
+fn contrasts(problem: &Problem) -> Vec<Option<f64>> {
+    let contrast = sharpness(problem).contrast.into_iter();
+    contrast.map(|contrast| Some(contrast?.ratio)).collect()
 }
 
 #[test]
@@ -76,7 +81,10 @@ fn a_blurred_photograph_is_told_from_sharp_and_from_noisy_ones() {
                 photograph.pixels[(y * photograph.width + x) as usize] * factor
             }),
         ]
-        .map(|problem| contrasts(&problem));
+        .map(|problem| (contrasts(&problem), sharpness(&problem).remark()));
+        let ((blurred, remark), (noisy, nothing)) = (blurred, noisy);
+        assert!(remark.is_some_and(|r| r.contains(&format!(": {frame} ("))));
+        assert_eq!(nothing, None);
         println!("{frame}: {was} {:?} {:?}", blurred[frame], noisy[frame]);
         assert!(blurred[frame].is_some_and(|c| c < 0.85 * was), "{frame}");
         assert!(
@@ -114,4 +122,36 @@ fn noise_in_a_plain_room_is_no_contrast() {
         });
     }
     assert_eq!(contrasts(&problem), vec![None; problem.photographs.len()]);
+}
+
+/// Noise in all photographs changes no contrast by more than three of its standard errors, and these stay small.
+#[test]
+fn standard_errors_of_contrasts_hold_what_noise_changes() {
+    let usual = contrasts(&ROOM);
+    let mut compared = 0;
+    for seed in 0..3 {
+        let mut problem = ROOM.clone();
+        for (frame, photograph) in problem.photographs.iter_mut().enumerate() {
+            let pixels = (photograph.pixels.iter().enumerate()).map(|(pixel, light)| {
+                let mut stream = Stream::new(11 + seed, frame as u64, pixel as u64, 0);
+                *light * (0.15 * stream.normal()).exp()
+            });
+            *photograph = Arc::new(Photograph {
+                pixels: pixels.collect(),
+                ..Photograph::clone(photograph)
+            });
+        }
+        let sharpness = sharpness(&problem);
+        assert_eq!(sharpness.remark(), None);
+        for (contrast, usual) in sharpness.contrast.iter().zip(&usual) {
+            if let (Some(contrast), Some(usual)) = (contrast, usual) {
+                let errors = (contrast.ratio / usual).ln().abs() / contrast.error;
+                println!("{contrast:?}, {errors} errors from {usual}");
+                assert!(errors < 3.0, "{errors}");
+                assert!(contrast.error < 0.2, "{}", contrast.error);
+                compared += 1;
+            }
+        }
+    }
+    assert!(compared > 12, "{compared}");
 }
